@@ -9,7 +9,6 @@ use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
 use chefshat_record::convert::{FieldProblem, check_label};
 use chefshat_room::ids::{Token, UnitToken};
 use chefshat_room::journal::Marked;
-use chefshat_room::{MARKERS_AT_ONCE, MAX_MARKERS, MarkError};
 use futures::{Stream, stream};
 use prost::Message as _;
 use tokio::time::Instant;
@@ -18,14 +17,12 @@ use tonic::{Code, Request, Response, Status};
 use super::limits::charged;
 use super::lookup::Lookup;
 use super::status::{
-    Refusal, field, internal, owner_token_wrong, room_gone, status, ticket_unknown,
+    MARKER_REFUSED, Refusal, field, internal, owner_token_wrong, room_failed, room_gone, status,
+    ticket_unknown,
 };
 use chefshat_admission::access::Caller;
 use chefshat_hosting::room::{Handle, MarkRequest, MarkerFollower};
 use chefshat_store::samples::SampleError;
-
-/// Why a marker is refused, if a field is.
-const REFUSED: &str = "MARKER_REFUSED";
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -117,7 +114,7 @@ impl InstrumentService for Instruments {
         let (room, secret) = self
             .find(caller, &request.room_id, &request.owner_token)
             .await?;
-        check_label(&request.label).map_err(|problem| field(REFUSED, &problem))?;
+        check_label(&request.label).map_err(|problem| field(MARKER_REFUSED, &problem))?;
         let moment = match request.elapsed_us {
             Some(elapsed_us) => Duration::from_micros(elapsed_us),
             None => room.clock().at(arrived),
@@ -129,8 +126,7 @@ impl InstrumentService for Instruments {
         let rooms = self.lookup.rooms();
         (rooms.may_store(key, marked.label.len())).map_err(Refusal::from)?;
         let marker = room.mark(MarkRequest { secret, marked }).await;
-        let marker = marker.map_err(Refusal::from)?;
-        let marker = marker.ok_or_else(owner_token_wrong)?.map_err(refused)?;
+        let marker = marker.map_err(room_failed(owner_token_wrong))?;
         Ok(Response::new(v1::AddMarkerResponse {
             marker: Some(marker),
         }))
@@ -177,9 +173,7 @@ impl InstrumentService for Instruments {
         let from = request.from_number.saturating_sub(1);
         let from = usize::try_from(from).unwrap_or(usize::MAX);
         let following = room.follow_markers(secret, from).await;
-        let following = following.map_err(Refusal::from)?;
-        let following = following.ok_or_else(owner_token_wrong)?;
-        let following = following.map_err(Refusal::from)?;
+        let following = following.map_err(room_failed(owner_token_wrong))?;
         Ok(Response::new(Box::pin(followed(following))))
     }
 }
@@ -215,24 +209,5 @@ fn samples_refused(error: SampleError) -> Status {
             tracing::error!(%error, "samples cannot be written");
             internal()
         }
-    }
-}
-
-/// The status for a refused marker.
-fn refused(error: MarkError) -> Status {
-    let too_many = |limit: &str| {
-        let metadata = [("limit", limit)];
-        status(
-            Code::ResourceExhausted,
-            "TOO_MANY_MARKERS",
-            error.to_string(),
-            metadata,
-        )
-    };
-    match error {
-        MarkError::GameOver => status(Code::FailedPrecondition, "GAME_OVER", error.to_string(), []),
-        MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
-        MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
-        MarkError::Future => field(REFUSED, &FieldProblem::new("elapsed_us", error.to_string())),
     }
 }

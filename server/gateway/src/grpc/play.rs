@@ -27,7 +27,7 @@ use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
 use super::limits::Arrived;
 use super::lookup::Lookup;
-use super::status::{Refusal, field, request_id, room_unknown, stream_ended, ticket_unknown};
+use super::status::{field, request_id, room_failed, room_unknown, stream_ended, ticket_unknown};
 use crate::peers::Peers;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{Executing, Hint, Key};
@@ -294,10 +294,7 @@ impl PlayService for Play {
                     executing.give_back();
                 }
                 let hint = room.hint(token.secret, decision, request_id).await;
-                let hint = hint
-                    .map_err(Refusal::from)?
-                    .ok_or_else(ticket_unknown)?
-                    .map_err(Refusal::from)?;
+                let hint = hint.map_err(room_failed(ticket_unknown))?;
                 return Ok(Response::new(v1::ActResponse {
                     result: None,
                     hint: Some(hint_to_proto(&hint)),
@@ -307,9 +304,7 @@ impl PlayService for Play {
         let result = room
             .act((token.secret, Key::of_caller(&caller)), action, arrived)
             .await
-            .map_err(Refusal::from)?
-            .ok_or_else(ticket_unknown)?
-            .map_err(Refusal::from)?;
+            .map_err(room_failed(ticket_unknown))?;
         Ok(Response::new(v1::ActResponse { result, hint: None }))
     }
 }

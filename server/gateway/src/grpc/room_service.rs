@@ -18,7 +18,9 @@ use super::lookup::Lookup;
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
-use super::status::{self, Refusal, field, name_fingerprint, request_id, ticket_unknown};
+use super::status::{
+    self, Refusal, field, name_fingerprint, request_id, room_failed, room_gone, ticket_unknown,
+};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
 use chefshat_hosting::room::{Handle, JoinRequest};
@@ -322,8 +324,7 @@ impl RoomService for RoomCalls {
                 client: Some(Payer::of_caller(&caller)),
             })
             .await
-            .map_err(Refusal::from)?
-            .map_err(Refusal::from)?;
+            .map_err(room_failed(room_gone))?;
         Ok(Response::new(v1::JoinRoomResponse {
             room: Some(*joined.room),
             seat: seat_number(joined.seat),
@@ -342,8 +343,8 @@ impl RoomService for RoomCalls {
         let handle = lookup
             .room_of_ticket(&caller, ticket.subject, ticket_unknown)
             .await?;
-        let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
-        let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
+        let left = handle.leave(ticket.secret).await;
+        let room = left.map_err(room_failed(ticket_unknown))?;
         Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))
     }
 
@@ -362,8 +363,7 @@ impl RoomService for RoomCalls {
         let room = handle
             .close(token.secret, client)
             .await
-            .map_err(Refusal::from)?
-            .ok_or_else(status::owner_token_wrong)?;
+            .map_err(room_failed(status::owner_token_wrong))?;
         Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
     }
 

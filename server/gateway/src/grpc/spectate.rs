@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
 use super::lookup::Lookup;
-use super::status::{Refusal, stream_ended};
+use super::status::{room_failed, room_gone, stream_ended};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
 use chefshat_base::metrics::StreamKind;
@@ -56,8 +56,7 @@ impl SpectatorService for Spectate {
             charged,
         })
         .await
-        .map_err(Refusal::from)?
-        .map_err(Refusal::from)?;
+        .map_err(room_failed(room_gone))?;
         let closing = self.closing.clone();
         let metrics = self.lookup.rooms().metrics();
         metrics.add_outbox(&outbox);

@@ -3,6 +3,7 @@
 //! cannot act on go to the log instead.
 
 use std::collections::HashMap;
+use std::convert::Infallible;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -15,16 +16,22 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{NotStored, Refused};
 use chefshat_hosting::cluster::Elsewhere;
 use chefshat_hosting::journaled::CreateProblem;
-use chefshat_hosting::room::{ReportRefusal, RoomGone, SpectateError};
+use chefshat_hosting::room::{ReportRefusal, RoomError, RoomGone, SpectateError};
 use chefshat_hosting::rooms::CreateError;
 use chefshat_room::ids::request_id_of;
-use chefshat_room::{ExpressError, HintError, JoinError, LeaveError, ReportError};
+use chefshat_room::{
+    ExpressError, HintError, JoinError, LeaveError, MARKERS_AT_ONCE, MAX_MARKERS, MarkError,
+    ReportError,
+};
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
 use chefshat_wire::outbox::StreamEnd;
 
 /// Domain of every `ErrorInfo`.
 const DOMAIN: &str = "chefshat";
+
+/// The reason of a marker with a malformed field.
+pub const MARKER_REFUSED: &str = "MARKER_REFUSED";
 
 /// Creates a status with its reason and metadata.
 pub fn status<const N: usize>(
@@ -336,6 +343,18 @@ pub fn is_refusal(status: &Status) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason != NOT_OWNER)
 }
 
+/// The status for an error of a room; `unknown`: if it does not know the secret.
+pub fn room_failed<E>(unknown: fn() -> Status) -> impl FnOnce(RoomError<E>) -> Status
+where
+    Refusal: From<E>,
+{
+    move |error| match error {
+        RoomError::Gone(RoomGone) => room_gone(),
+        RoomError::SecretUnknown => unknown(),
+        RoomError::Refused(error) => Refusal::from(error).into(),
+    }
+}
+
 /// The node that has a room or tournament cannot be reached, or is just handing it over.
 pub fn owner_unreachable() -> Status {
     status(
@@ -359,6 +378,12 @@ pub struct Refusal(pub Status);
 impl From<Refusal> for Status {
     fn from(refusal: Refusal) -> Self {
         refusal.0
+    }
+}
+
+impl From<Infallible> for Refusal {
+    fn from(never: Infallible) -> Self {
+        match never {}
     }
 }
 
@@ -434,6 +459,31 @@ impl From<HintError> for Refusal {
             HintError::TooMany => (Code::ResourceExhausted, "TOO_MANY_HINTS"),
         };
         Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<MarkError> for Refusal {
+    fn from(error: MarkError) -> Self {
+        let too_many = |limit: &str| {
+            let metadata = [("limit", limit)];
+            status(
+                Code::ResourceExhausted,
+                "TOO_MANY_MARKERS",
+                error.to_string(),
+                metadata,
+            )
+        };
+        Self(match error {
+            MarkError::GameOver => {
+                status(Code::FailedPrecondition, "GAME_OVER", error.to_string(), [])
+            }
+            MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
+            MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
+            MarkError::Future => field(
+                MARKER_REFUSED,
+                &FieldProblem::new("elapsed_us", error.to_string()),
+            ),
+        })
     }
 }
 

@@ -8,7 +8,7 @@ use tokio::sync::watch;
 use tonic::{Request, Response, Status};
 
 use super::lookup::Lookup;
-use super::status::{Refusal, room_gone, table_unknown};
+use super::status::{room_failed, room_gone, table_unknown};
 use chefshat_admission::access::Caller;
 use chefshat_hosting::room::{Handle, SentState};
 use chefshat_room::ids::Token;
@@ -45,8 +45,8 @@ impl TableService for TableCalls {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let (room, secret) = self.find(&caller, &request.table_ticket).await?;
-        let ruled = room.report(secret, request).await.map_err(Refusal::from)?;
-        let response = ruled.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
+        let ruled = room.report(secret, request).await;
+        let response = ruled.map_err(room_failed(table_unknown))?;
         Ok(Response::new(*response))
     }
 
@@ -58,8 +58,8 @@ impl TableService for TableCalls {
         let (room, secret) = self
             .find(&caller, &request.into_inner().table_ticket)
             .await?;
-        let watching = room.watch_table(secret).await.map_err(Refusal::from)?;
-        let states = watching.ok_or_else(table_unknown)?.map_err(Refusal::from)?;
+        let watching = room.watch_table(secret).await;
+        let states = watching.map_err(room_failed(table_unknown))?;
         Ok(Response::new(Box::pin(followed(states))))
     }
 }

@@ -16,7 +16,7 @@ use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, Hosted, LEFT_ALONE, LEFT_TO_NEXT};
 use crate::cluster::{FoundBy, LOOK_LIMIT, Location, NodeLease, StoreDirectory, UnitEvent};
 use crate::config::ServerConfig;
-use crate::room::{Handle, JoinRequest, RoomGone};
+use crate::room::{Handle, JoinRequest, RoomError, RoomGone};
 use crate::rooms::{CreateError, NewRoom, Rooms};
 use crate::studies::Studies;
 use crate::tournaments::{Entry, TournamentHandle, Tournaments};
@@ -186,10 +186,13 @@ async fn soon<T>(future: impl Future<Output = T>) -> T {
 
 /// Takes a seat. The answer says that this is committed.
 async fn join(room: &Handle, name: &str) -> Result<(), RoomGone> {
-    let request = JoinRequest::for_tests(name);
-    room.join(request).await.map(|joined| {
-        joined.expect("a free seat");
-    })
+    match room.join(JoinRequest::for_tests(name)).await {
+        Err(RoomError::Gone(gone)) => Err(gone),
+        joined => {
+            joined.expect("a free seat");
+            Ok(())
+        }
+    }
 }
 
 /// The names on the seats of a room.

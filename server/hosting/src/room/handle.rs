@@ -1,32 +1,32 @@
 //! The handle of a room: sends messages to its mailbox and returns the answers.
 
+use std::convert::Infallible;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
+use super::markers::MarkerFollower;
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, Loss, MarkOutcome,
-    MarkRequest, Message, NotAttached, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
+    AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkRequest, Message, NotAttached,
+    Reply, ReportRefusal, RoomError, RoomGone, SeatAction, SpectateError, SpectateRequest,
 };
 use super::shared::SharedRoom;
+use super::table_view::SentState;
 use super::task::{self, Room, TaskContext};
-use chefshat_admission::limits::{Key, Payer};
+use chefshat_admission::limits::{Hint, Key, Payer};
 use chefshat_base::clock::RoomClock;
 use chefshat_room::ids::RoomId;
 use chefshat_room::journal::AbortReason;
-use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError};
+use chefshat_room::{
+    Answer, ConnectionId, Core, ExpressError, HintError, JoinError, LeaveError, MarkError,
+};
 use chefshat_store::Journal;
-
-/// The room is gone: closed, ended long ago, or stopped after a failure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the room is gone")]
-pub struct RoomGone;
 
 /// A handle to a room.
 #[derive(Clone)]
@@ -124,21 +124,21 @@ impl Handle {
     /// Takes a seat.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) no seat can be taken.
-    pub async fn join(&self, request: JoinRequest) -> Result<Result<Joined, JoinError>, RoomGone> {
-        self.ask(|reply| Message::Join(Box::new(request), reply))
+    /// The room is gone, or no seat can be taken.
+    pub async fn join(&self, request: JoinRequest) -> Result<Joined, RoomError<JoinError>> {
+        self.request(|reply| Message::Join(Box::new(request), reply))
             .await
     }
 
     /// Attaches a stream to a seat.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) the stream is not attached.
+    /// The room is gone, or the stream is not attached.
     pub async fn attach(
         &self,
         request: AttachRequest,
-    ) -> Result<Result<AttachedSeat, NotAttached>, RoomGone> {
-        self.ask(|reply| Message::Attach(Box::new(request), reply))
+    ) -> Result<AttachedSeat, RoomError<NotAttached>> {
+        self.request(|reply| Message::Attach(Box::new(request), reply))
             .await
     }
 
@@ -213,44 +213,40 @@ impl Handle {
     }
 
     /// Executes a command of a seat without a stream, by the secret of its ticket and by who is charged
-    /// for what is stored; `None` if the room has no such ticket.
+    /// for what is stored.
     ///
     /// # Errors
-    /// The room is gone.
+    /// The room is gone, has no such ticket, or refuses the expression.
     pub async fn act(
         &self,
         by: ([u8; 32], Key),
         action: SeatAction,
         arrived: Instant,
-    ) -> Result<Option<Acted>, RoomGone> {
-        self.ask(|reply| Message::Act(by, action, arrived, reply))
+    ) -> Result<Option<v1::AnswerResult>, RoomError<ExpressError>> {
+        self.request(|reply| Message::Act(by, action, arrived, reply))
             .await
     }
 
-    /// Asks for a hint for a decision; `None` if the room has no such ticket. The same `request_id`
-    /// again gets the same hint.
+    /// Asks for a hint for a decision. The same `request_id` again gets the same hint.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) there is no hint.
+    /// The room is gone, has no such ticket, or has no hint.
     pub async fn hint(
         &self,
         secret: [u8; 32],
         decision: u64,
         request_id: Option<[u8; 32]>,
-    ) -> Result<Option<Hinted>, RoomGone> {
-        self.ask(|reply| Message::Hint(secret, decision, request_id, reply))
+    ) -> Result<Hint, RoomError<HintError>> {
+        self.request(|reply| Message::Hint(secret, decision, request_id, reply))
             .await
     }
 
     /// Adds a spectator.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) it cannot be watched.
-    pub async fn spectate(
-        &self,
-        request: SpectateRequest,
-    ) -> Result<Result<(), SpectateError>, RoomGone> {
-        self.ask(|reply| Message::Spectate(Box::new(request), reply))
+    /// The room is gone, or cannot be watched.
+    pub async fn spectate(&self, request: SpectateRequest) -> Result<(), RoomError<SpectateError>> {
+        self.request(|reply| Message::Spectate(Box::new(request), reply))
             .await
     }
 
@@ -316,28 +312,24 @@ impl Handle {
         self.ask(Message::HasStarted).await
     }
 
-    /// Frees a seat; `None` if the room has no such ticket.
+    /// Frees a seat.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) the seat cannot be freed.
-    pub async fn leave(
-        &self,
-        secret: [u8; 32],
-    ) -> Result<Option<Result<v1::Room, LeaveError>>, RoomGone> {
-        self.ask(|reply| Message::Leave(secret, reply)).await
+    /// The room is gone, has no such ticket, or the seat cannot be freed.
+    pub async fn leave(&self, secret: [u8; 32]) -> Result<v1::Room, RoomError<LeaveError>> {
+        self.request(|reply| Message::Leave(secret, reply)).await
     }
 
-    /// Closes the room; `None` if the token is not its owner's. `client`: who asks for it, and has
-    /// broken the game off for the seats that it took.
+    /// Closes the room. `client`: who asks for it, and has broken the game off for the seats that it took.
     ///
     /// # Errors
-    /// The room is gone.
+    /// The room is gone, or the token is not its owner's.
     pub async fn close(
         &self,
         secret: [u8; 32],
         client: Payer,
-    ) -> Result<Option<v1::Room>, RoomGone> {
-        self.ask(|reply| Message::Close(secret, client, reply))
+    ) -> Result<v1::Room, RoomError<Infallible>> {
+        self.request(|reply| Message::Close(secret, client, reply))
             .await
     }
 
@@ -361,46 +353,50 @@ impl Handle {
         let _ = self.mailbox.try_send(Message::Wake);
     }
 
-    /// Reports something from the physical table; `None` if its ticket is another.
+    /// Reports something from the physical table.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) the report is refused.
+    /// The room is gone, its table has another ticket, or the report is refused.
     pub async fn report(
         &self,
         secret: [u8; 32],
         request: v1::ReportRequest,
-    ) -> Result<Option<Ruled>, RoomGone> {
-        self.ask(|reply| Message::Report(secret, Box::new(request), reply))
+    ) -> Result<Box<v1::ReportResponse>, RoomError<ReportRefusal>> {
+        self.request(|reply| Message::Report(secret, Box::new(request), reply))
             .await
     }
 
-    /// Watches the physical table; `None` if its ticket is another.
+    /// Watches the physical table: its states, from the current one on.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) too many watch it.
-    pub async fn watch_table(&self, secret: [u8; 32]) -> Result<Option<Watching>, RoomGone> {
-        self.ask(|reply| Message::WatchTable(secret, reply)).await
-    }
-
-    /// Adds a marker; `None` if the token is not the owner's.
-    ///
-    /// # Errors
-    /// The room is gone, or (inner result) the marker is refused.
-    pub async fn mark(&self, request: MarkRequest) -> Result<Option<MarkOutcome>, RoomGone> {
-        self.ask(|reply| Message::Mark(Box::new(request), reply))
+    /// The room is gone, its table has another ticket, or too many watch it.
+    pub async fn watch_table(
+        &self,
+        secret: [u8; 32],
+    ) -> Result<watch::Receiver<SentState>, RoomError<SpectateError>> {
+        self.request(|reply| Message::WatchTable(secret, reply))
             .await
     }
 
-    /// Follows the markers from a position on; `None` if the token is not the owner's.
+    /// Adds a marker.
     ///
     /// # Errors
-    /// The room is gone, or (inner result) too many follow them.
+    /// The room is gone, the token is not its owner's, or the marker is refused.
+    pub async fn mark(&self, request: MarkRequest) -> Result<v1::Marker, RoomError<MarkError>> {
+        self.request(|reply| Message::Mark(Box::new(request), reply))
+            .await
+    }
+
+    /// Follows the markers from a position on.
+    ///
+    /// # Errors
+    /// The room is gone, the token is not its owner's, or too many follow them.
     pub async fn follow_markers(
         &self,
         secret: [u8; 32],
         position: usize,
-    ) -> Result<Option<Following>, RoomGone> {
-        self.ask(|reply| Message::FollowMarkers(secret, position, reply))
+    ) -> Result<MarkerFollower, RoomError<SpectateError>> {
+        self.request(|reply| Message::FollowMarkers(secret, position, reply))
             .await
     }
 
@@ -416,6 +412,14 @@ impl Handle {
     pub async fn close_without_token(&self) {
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(Message::Abort(AbortReason::Closed)).await;
+    }
+
+    /// Asks for something that the room may refuse.
+    async fn request<T, E>(
+        &self,
+        message: impl FnOnce(Reply<T, E>) -> Message,
+    ) -> Result<T, RoomError<E>> {
+        self.ask(message).await?
     }
 
     async fn ask<T>(

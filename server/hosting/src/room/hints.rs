@@ -3,13 +3,12 @@
 
 use chefshat_engine::Seat;
 use chefshat_room::HintError;
-use tokio::sync::oneshot;
 
-use super::message::Hinted;
+use super::message::{Reply, RoomError};
 use chefshat_admission::limits::Hint;
 
 /// Where the answer to a request for a hint goes.
-pub(super) type HintReply = oneshot::Sender<Option<Hinted>>;
+pub(super) type HintReply = Reply<Hint, HintError>;
 
 /// A request for a hint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,12 +93,13 @@ impl LatestHint {
 
 fn refuse(reply: HintReply, error: HintError) {
     // The caller may be gone.
-    let _ = reply.send(Some(Err(error)));
+    let _ = reply.send(Err(RoomError::Refused(error)));
 }
 
 #[cfg(test)]
 mod tests {
     use chefshat_engine::ActionId;
+    use tokio::sync::oneshot;
 
     use super::*;
 
@@ -125,10 +125,10 @@ mod tests {
         // The newest caller waits.
         let (reply, mut second) = oneshot::channel();
         assert!(latest.repeat(ASKED, reply).expect("the same").is_none());
-        let refused = first.try_recv().expect("an answer").expect("a ticket");
-        assert_eq!(refused.expect_err("refused"), HintError::TooMany);
+        let refused = first.try_recv().expect("an answer").expect_err("refused");
+        assert_eq!(refused, RoomError::Refused(HintError::TooMany));
         let (reply, hint) = latest.ended(ASKED, Some(hint()), Ok(())).expect("a caller");
-        let _ = reply.send(Some(Ok(hint)));
+        let _ = reply.send(Ok(hint));
         assert!(second.try_recv().is_ok());
         // After the hint was given.
         let (reply, _third) = oneshot::channel();
@@ -187,8 +187,8 @@ mod tests {
                 );
                 assert!(latest.ended(ASKED, Some(hint()), Ok(())).is_none());
             }
-            let answer = caller.try_recv().expect("an answer").expect("a ticket");
-            assert_eq!(answer.expect_err("refused"), HintError::Closed);
+            let refused = caller.try_recv().expect("an answer").expect_err("refused");
+            assert_eq!(refused, RoomError::Refused(HintError::Closed));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The messages to a room: requests with the means to answer them.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -20,6 +21,28 @@ use chefshat_room::{
     ReportError,
 };
 use chefshat_wire::outbox::{HandStamp, OnSpace, Outbox};
+
+/// The room is gone: closed, ended long ago, or stopped after a failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the room is gone")]
+pub struct RoomGone;
+
+/// Why a room has not done what it was asked to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum RoomError<E> {
+    /// The room is gone.
+    #[error(transparent)]
+    Gone(#[from] RoomGone),
+    /// The secret is not that of a ticket or token of this room.
+    #[error("this room has no such ticket or token")]
+    SecretUnknown,
+    /// The room refuses it.
+    #[error("{0}")]
+    Refused(E),
+}
+
+/// Where the answer to a request goes.
+pub(super) type Reply<T, E> = oneshot::Sender<Result<T, RoomError<E>>>;
 
 /// A request for a seat.
 #[derive(Debug)]
@@ -116,8 +139,6 @@ impl Supersedes {
 /// Why a stream was not attached to a seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotAttached {
-    /// The room has no such ticket.
-    TicketUnknown,
     /// The client has left the stream.
     StreamOver,
     /// The connection with this number keeps the seat.
@@ -172,9 +193,6 @@ pub enum SeatAction {
     Resume,
 }
 
-/// The result of a command without a stream.
-pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
-
 /// Why a report from a physical table is refused.
 #[derive(Debug)]
 pub enum ReportRefusal {
@@ -184,14 +202,6 @@ pub enum ReportRefusal {
     Refused(ReportError),
 }
 
-/// The result of a request for a hint.
-pub(super) type Hinted = Result<Hint, HintError>;
-
-/// The result of a report.
-pub type Ruled = Result<Box<v1::ReportResponse>, ReportRefusal>;
-/// The states of a table, from the current one on.
-pub type Watching = Result<watch::Receiver<SentState>, SpectateError>;
-
 /// A request for a marker.
 #[derive(Debug)]
 pub struct MarkRequest {
@@ -200,11 +210,6 @@ pub struct MarkRequest {
     /// What is marked.
     pub marked: Marked,
 }
-
-/// The result of a request for a marker.
-pub(super) type MarkOutcome = Result<v1::Marker, MarkError>;
-/// A stream that follows markers.
-pub(super) type Following = Result<MarkerFollower, SpectateError>;
 
 /// How a seat loses its connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -219,11 +224,8 @@ pub enum Loss {
 
 /// A message to a room.
 pub(super) enum Message {
-    Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
-    Attach(
-        Box<AttachRequest>,
-        oneshot::Sender<Result<AttachedSeat, NotAttached>>,
-    ),
+    Join(Box<JoinRequest>, Reply<Joined, JoinError>),
+    Attach(Box<AttachRequest>, Reply<AttachedSeat, NotAttached>),
     Lost(Seat, ConnectionId, Loss),
     Do(Seat, ConnectionId, SeatAction, Instant),
     /// With the secret of the seat's ticket, and who is charged for what is stored.
@@ -231,42 +233,31 @@ pub(super) enum Message {
         ([u8; 32], Key),
         SeatAction,
         Instant,
-        oneshot::Sender<Option<Acted>>,
+        Reply<Option<v1::AnswerResult>, ExpressError>,
     ),
     /// Asks for a hint for a decision, with the secret of the seat's ticket and the id of the request,
     /// if it has one.
-    Hint(
-        [u8; 32],
-        u64,
-        Option<[u8; 32]>,
-        oneshot::Sender<Option<Hinted>>,
-    ),
-    Spectate(
-        Box<SpectateRequest>,
-        oneshot::Sender<Result<(), SpectateError>>,
-    ),
+    Hint([u8; 32], u64, Option<[u8; 32]>, Reply<Hint, HintError>),
+    Spectate(Box<SpectateRequest>, Reply<(), SpectateError>),
     Describe(oneshot::Sender<v1::Room>),
     HasTicket(Vec<[u8; 32]>, oneshot::Sender<bool>),
     /// The seat of a ticket, and whether the game has started.
     SeatOf([u8; 32], oneshot::Sender<Option<(Seat, bool)>>),
     /// Whether the game has started.
     HasStarted(oneshot::Sender<bool>),
-    Close([u8; 32], Payer, oneshot::Sender<Option<v1::Room>>),
-    Leave(
-        [u8; 32],
-        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
-    ),
+    Close([u8; 32], Payer, Reply<v1::Room, Infallible>),
+    Leave([u8; 32], Reply<v1::Room, LeaveError>),
     /// A report, with the secret of the table's ticket.
     Report(
         [u8; 32],
         Box<v1::ReportRequest>,
-        oneshot::Sender<Option<Ruled>>,
+        Reply<Box<v1::ReportResponse>, ReportRefusal>,
     ),
-    WatchTable([u8; 32], oneshot::Sender<Option<Watching>>),
+    WatchTable([u8; 32], Reply<watch::Receiver<SentState>, SpectateError>),
     /// Adds a marker.
-    Mark(Box<MarkRequest>, oneshot::Sender<Option<MarkOutcome>>),
+    Mark(Box<MarkRequest>, Reply<v1::Marker, MarkError>),
     /// Follows the markers from this position on, with the secret of the owner's token.
-    FollowMarkers([u8; 32], usize, oneshot::Sender<Option<Following>>),
+    FollowMarkers([u8; 32], usize, Reply<MarkerFollower, SpectateError>),
     /// The participant of a seat has left the tournament or study.
     Retire(Seat),
     Abort(AbortReason),

@@ -19,11 +19,11 @@ mod telemetry;
 #[cfg(test)]
 mod tests;
 
-pub use handle::{Handle, RoomGone, spawn_room};
+pub use handle::{Handle, spawn_room};
 pub use markers::MarkerFollower;
 pub use message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkRequest, NotAttached,
-    ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Supersedes, Watching,
+    AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkRequest, NotAttached,
+    ReportRefusal, RoomError, RoomGone, SeatAction, SpectateError, SpectateRequest, Supersedes,
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use table_view::SentState;

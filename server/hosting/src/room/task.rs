@@ -7,6 +7,7 @@ mod committing;
 mod inputs;
 mod publishing;
 
+use std::convert::Infallible;
 use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -20,11 +21,14 @@ use chefshat_proto::v1;
 use chefshat_record::outcome::Outcome;
 use chefshat_room::ids::RoomId;
 use chefshat_room::journal::AbortReason;
-use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, Searched};
+use chefshat_room::{
+    Answer, ConnectionId, Core, ExpressError, JoinError, LeaveError, MarkError, ReportOutcome,
+    Searched,
+};
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
 use futures::{FutureExt as _, StreamExt as _};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::{Instant, Sleep};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
@@ -32,14 +36,14 @@ use tracing::{Instrument as _, debug};
 
 use super::clients::Clients;
 use super::hints::{HintReply, HintRequest, LatestHint};
-use super::markers::MarkerLog;
+use super::markers::{MarkerFollower, MarkerLog};
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Following, Joined, MarkOutcome, Message, NotAttached,
-    NotifySpace, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
+    AttachRequest, AttachedSeat, Joined, Message, NotAttached, NotifySpace, Reply, ReportRefusal,
+    RoomError, SeatAction, SpectateError, SpectateRequest,
 };
 use super::shared::SharedRoom;
 use super::subscriber::{MAX_SPECTATORS, PublicEvents, Subscriber};
-use super::table_view::TableView;
+use super::table_view::{SentState, TableView};
 use super::telemetry::RoomTelemetry;
 use crate::cluster::{NodeLease, UnitEvent};
 use crate::config::{HINT_TIME, ROOM_MAILBOX};
@@ -184,35 +188,29 @@ pub(super) fn spawn(
 
 /// An answer or update that is sent once the changes are committed.
 enum AfterCommit {
-    Join(
-        oneshot::Sender<Result<Joined, JoinError>>,
-        Result<Joined, JoinError>,
-    ),
+    Join(Reply<Joined, JoinError>, Result<Joined, JoinError>),
     Attach(
         Box<AttachRequest>,
         Seat,
         ConnectionId,
-        oneshot::Sender<Result<AttachedSeat, NotAttached>>,
+        Reply<AttachedSeat, NotAttached>,
     ),
     Result(Seat, ConnectionId, v1::AnswerResult),
     Refuse(Seat, ConnectionId, v1::Refused),
-    Acted(oneshot::Sender<Option<Acted>>, Acted),
-    Closed(oneshot::Sender<Option<v1::Room>>),
-    Left(
-        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
-        Result<(), LeaveError>,
+    Acted(
+        Reply<Option<v1::AnswerResult>, ExpressError>,
+        Result<Option<v1::AnswerResult>, ExpressError>,
     ),
+    Closed(Reply<v1::Room, Infallible>),
+    Left(Reply<v1::Room, LeaveError>, Result<(), LeaveError>),
     Describe(oneshot::Sender<v1::Room>),
-    Spectate(
-        Box<SpectateRequest>,
-        oneshot::Sender<Result<(), SpectateError>>,
-    ),
-    Reported(oneshot::Sender<Option<Ruled>>, ReportOutcome),
-    WatchTable(oneshot::Sender<Option<Watching>>),
+    Spectate(Box<SpectateRequest>, Reply<(), SpectateError>),
+    Reported(Reply<Box<v1::ReportResponse>, ReportRefusal>, ReportOutcome),
+    WatchTable(Reply<watch::Receiver<SentState>, SpectateError>),
     Hint(HintReply, Hint),
     /// The marker with this number.
-    Marked(oneshot::Sender<Option<MarkOutcome>>, usize),
-    FollowMarkers(usize, oneshot::Sender<Option<Following>>),
+    Marked(Reply<v1::Marker, MarkError>, usize),
+    FollowMarkers(usize, Reply<MarkerFollower, SpectateError>),
 }
 
 /// The state of a room: its core, journal and subscribers.
@@ -454,7 +452,7 @@ impl Room {
     /// Starts to compute a hint.
     fn start_hint(&mut self, secret: &[u8], decision: u64, id: Option<[u8; 32]>, reply: HintReply) {
         let Some(seat) = self.core.seat_of_ticket(secret) else {
-            return answer(reply, None);
+            return answer(reply, Err(RoomError::SecretUnknown));
         };
         let request = HintRequest { seat, decision, id };
         let reply = match self.latest_hint.repeat(request, reply) {
@@ -477,7 +475,7 @@ impl Room {
                 self.hints
                     .push(hint.map(move |hint| (request, hint)).boxed());
             }
-            Err(error) => answer(reply, Some(Err(error))),
+            Err(error) => answer(reply, Err(RoomError::Refused(error))),
         }
     }
 

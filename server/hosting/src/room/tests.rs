@@ -18,7 +18,7 @@ use tokio_util::task::TaskTracker;
 
 use super::subscriber::DeliveryOptions;
 use super::{
-    AttachRequest, GameEnd, Handle, JoinRequest, MAX_SPECTATORS, NotAttached, RoomWatcher,
+    AttachRequest, GameEnd, Handle, JoinRequest, MAX_SPECTATORS, RoomError, RoomWatcher,
     SeatAction, SpectateError, SpectateRequest, Supersedes, TaskContext, spawn_room,
 };
 use crate::cluster::NodeLease;
@@ -184,7 +184,6 @@ async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     let joined = room
         .join(JoinRequest::for_tests("somebody"))
         .await
-        .expect("the room exists")
         .expect("a free seat");
     attach_from(room, joined.ticket, charged).await
 }
@@ -221,11 +220,7 @@ async fn attach_from(room: &Handle, ticket: RoomToken, charged: Key) -> Attached
         charged: charged.into(),
         ..attachment(&ticket, outbox)
     };
-    let attached = room
-        .attach(attachment)
-        .await
-        .expect("the room exists")
-        .expect("a valid ticket");
+    let attached = room.attach(attachment).await.expect("a valid ticket");
     AttachedSeat {
         seat: attached.seat,
         connection: attached.connection,
@@ -328,8 +323,7 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     let (outbox, updates) = Outbox::new();
     let mut attachment = attachment(&stalled.ticket, outbox);
     attachment.options.from = from;
-    let attached = room.attach(attachment).await.expect("the room exists");
-    let attached = attached.expect("a valid ticket");
+    let attached = room.attach(attachment).await.expect("a valid ticket");
     let mut later = AttachedSeat {
         seat: attached.seat,
         connection: attached.connection,
@@ -395,7 +389,7 @@ async fn watched_from_the_beginning(room: &Handle) -> (Option<v1::Snapshot>, Vec
         is_owner: false,
         charged: Key::Local,
     };
-    let spectating = room.spectate(request).await.expect("the room exists");
+    let spectating = room.spectate(request).await;
     spectating.expect("spectators are admitted");
     loop {
         let message = watched.next().await.expect("a message").expect("no error");
@@ -432,7 +426,7 @@ async fn a_seat_that_is_given_up_in_the_batch_of_its_attachment_is_not_attached(
     let (outbox, mut updates) = Outbox::new();
     let again = room.attach(attachment(&removed.ticket, outbox));
     let (again, ()) = tokio::join!(again, room.retire(removed.seat));
-    assert!(matches!(again, Ok(Err(NotAttached::TicketUnknown))));
+    assert!(matches!(again, Err(RoomError::SecretUnknown)));
     assert!(
         updates.next().now_or_never().flatten().is_none(),
         "nothing was sent"
@@ -446,8 +440,8 @@ async fn a_seat_that_is_given_up_in_the_batch_of_its_attachment_is_not_attached(
     let (outbox, _updates) = Outbox::new();
     let again = room.attach(attachment(&seat.ticket, outbox));
     let (again, left) = tokio::join!(again, room.leave(seat.ticket.secret));
-    assert!(matches!(again, Ok(Err(NotAttached::TicketUnknown))));
-    assert!(matches!(left, Ok(Some(Ok(_)))));
+    assert!(matches!(again, Err(RoomError::SecretUnknown)));
+    left.expect("the game has not started");
     let described = room.describe().await.expect("the room exists");
     assert!(!described.seats[seat.seat.index()].connected);
 }
@@ -675,7 +669,7 @@ async fn one_caller_cannot_take_all_places_of_spectators() {
             is_owner: false,
             charged,
         };
-        room.spectate(request).await.expect("the room exists")
+        room.spectate(request).await
     };
     let mut streams = Vec::new();
     let full = loop {
@@ -685,7 +679,7 @@ async fn one_caller_cannot_take_all_places_of_spectators() {
             Err(error) => break error,
         }
     };
-    assert_eq!(full, SpectateError::Full);
+    assert_eq!(full, RoomError::Refused(SpectateError::Full));
     assert_eq!(streams.len(), MAX_SPECTATORS / 2);
     let (outbox, _stream) = Outbox::new();
     let other = Key::Address([192, 0, 2, 1].into());
@@ -719,7 +713,6 @@ async fn check_streams_end_after_panic(at_once: bool) {
         charged: Key::Local,
     })
     .await
-    .expect("the room exists")
     .expect("spectators are admitted");
     for seat in &seats {
         for action in 0..u32::from(u8::MAX) {
@@ -992,20 +985,20 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
                 client: seated[index as usize],
                 ..JoinRequest::for_tests(format!("player {index}"))
             });
-            let joined = joined.await.expect("the room exists").expect("a free seat");
+            let joined = joined.await.expect("a free seat");
             let (outbox, updates) = Outbox::new();
             let attachment = AttachRequest {
                 charged: connected.map_or(of(address(100)), |them| them[index as usize]),
                 ..attachment(&joined.ticket, outbox)
             };
-            let attached = room.attach(attachment).await.expect("the room exists");
+            let attached = room.attach(attachment).await;
             seats.push((attached.expect("a valid ticket"), updates));
         }
         while room.describe().await.expect("shown").state() != v1::RoomState::Playing {
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
         let closed = room.close(OWNER, closes).await;
-        assert!(closed.expect("the room exists").is_some());
+        closed.expect("its owner closes it");
         let entries = loop {
             match store
                 .finished(Id::from_bytes([2; 16]))
@@ -1033,7 +1026,7 @@ async fn a_client_takes_one_seat_if_the_policy_says_so() {
         ..JoinRequest::for_tests("somebody")
     };
     let join = async |room: &Handle, client: u8| {
-        let joined = room.join(request(client)).await.expect("the room exists");
+        let joined = room.join(request(client)).await;
         joined.map(|joined| joined.ticket)
     };
     let open = room(Policy::default(), 1).await;
@@ -1049,9 +1042,9 @@ async fn a_client_takes_one_seat_if_the_policy_says_so() {
     let strict = room(policy, 1).await;
     let first = join(&strict, 1).await.expect("its seat");
     let again = join(&strict, 1).await.map(|_| ());
-    assert_eq!(again, Err(JoinError::ClientHasSeat));
+    assert_eq!(again, Err(RoomError::Refused(JoinError::ClientHasSeat)));
     join(&strict, 2).await.expect("another client");
-    let left = strict.leave(first.secret).await.expect("the room exists");
-    left.expect("its ticket").expect("the game has not started");
+    let left = strict.leave(first.secret).await;
+    left.expect("the game has not started");
     join(&strict, 1).await.expect("its seat is free again");
 }

@@ -24,7 +24,7 @@ use chefshat_admission::limits::Payer;
 use chefshat_base::tasks::short;
 use chefshat_hosting::config::MAX_SEATS_PER_STREAM;
 use chefshat_hosting::room::subscriber::DeliveryOptions;
-use chefshat_hosting::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
+use chefshat_hosting::room::{AttachRequest, NotAttached, RoomError, RoomGone, Supersedes};
 use chefshat_room::ids::{RoomToken, UnitToken};
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::outbox::StreamEnd;
@@ -297,7 +297,7 @@ impl Reader {
             detached: Arc::clone(&detached),
             assigned_ticket,
         };
-        match room.attach(request).await? {
+        match room.attach(request).await {
             Ok(attached) => {
                 let bound = BoundSeat {
                     room,
@@ -309,9 +309,10 @@ impl Reader {
                 };
                 self.seats.insert(handle, bound);
             }
-            Err(NotAttached::TicketUnknown) => return Ok(false),
-            Err(NotAttached::StreamOver) => {}
-            Err(NotAttached::HeldBy(holder)) => {
+            Err(RoomError::Gone(gone)) => return Err(gone),
+            Err(RoomError::SecretUnknown) => return Ok(false),
+            Err(RoomError::Refused(NotAttached::StreamOver)) => {}
+            Err(RoomError::Refused(NotAttached::HeldBy(holder))) => {
                 let contested = Contested {
                     attach,
                     assigned_ticket,

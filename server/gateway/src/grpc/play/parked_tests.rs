@@ -139,7 +139,7 @@ impl Node {
         let created = self.rooms.create(NewRoom::for_tests());
         let room = created.await.expect("a room").handle;
         let joined = room.join(JoinRequest::for_tests("Ada"));
-        let Joined { ticket, .. } = joined.await.expect("it runs").expect("a free seat");
+        let Joined { ticket, .. } = joined.await.expect("a free seat");
         attachment(&ticket)
     }
 }

@@ -8,14 +8,13 @@ use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_room::ids::{RoomToken, Token};
 use chefshat_room::journal::SeatedParticipant;
-use chefshat_room::{ConnectionId, Core, ExpressError, JoinError, ReportOutcome};
-use tokio::sync::oneshot;
+use chefshat_room::{ConnectionId, Core, ExpressError, JoinError, MarkError, ReportOutcome};
 use tokio::time::Instant;
 
 use super::{AfterCommit, Room, answer, is_connection};
 use crate::room::message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkOutcome, MarkRequest,
-    Message, NotAttached, ReportRefusal, SeatAction,
+    AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkRequest, Message, NotAttached,
+    Reply, ReportRefusal, RoomError, SeatAction,
 };
 use crate::room::subscriber::Subscriber;
 use chefshat_admission::limits::{Key, NotStored};
@@ -39,7 +38,7 @@ impl Room {
                         let acted = self.perform((seat, charged), action, arrived);
                         self.after_commit.push(AfterCommit::Acted(reply, acted));
                     }
-                    None => answer(reply, None),
+                    None => answer(reply, Err(RoomError::SecretUnknown)),
                 }
             }
             Message::Hint(secret, decision, id, reply) => {
@@ -70,7 +69,7 @@ impl Room {
                     self.core.close(self.now, seats);
                     self.after_commit.push(AfterCommit::Closed(reply));
                 } else {
-                    answer(reply, None);
+                    answer(reply, Err(RoomError::SecretUnknown));
                 }
             }
             Message::Leave(secret, reply) => match self.core.seat_of_ticket(&secret) {
@@ -83,18 +82,18 @@ impl Room {
                     }
                     self.after_commit.push(AfterCommit::Left(reply, left));
                 }
-                None => answer(reply, None),
+                None => answer(reply, Err(RoomError::SecretUnknown)),
             },
             Message::Report(secret, request, reply) => match self.report(&secret, *request) {
                 Some(Ok(outcome)) => self
                     .after_commit
                     .push(AfterCommit::Reported(reply, outcome)),
-                Some(Err(refusal)) => answer(reply, Some(Err(refusal))),
-                None => answer(reply, None),
+                Some(Err(refusal)) => answer(reply, Err(RoomError::Refused(refusal))),
+                None => answer(reply, Err(RoomError::SecretUnknown)),
             },
             Message::WatchTable(secret, reply) => match self.has_table(&secret) {
                 true => self.after_commit.push(AfterCommit::WatchTable(reply)),
-                false => answer(reply, None),
+                false => answer(reply, Err(RoomError::SecretUnknown)),
             },
             Message::Mark(request, reply) => self.mark(*request, reply),
             Message::FollowMarkers(secret, position, reply) => {
@@ -102,7 +101,7 @@ impl Room {
                     true => self
                         .after_commit
                         .push(AfterCommit::FollowMarkers(position, reply)),
-                    false => answer(reply, None),
+                    false => answer(reply, Err(RoomError::SecretUnknown)),
                 }
             }
             Message::Retire(seat) => self.retire(seat),
@@ -166,19 +165,15 @@ impl Room {
         }
     }
 
-    fn attach(
-        &mut self,
-        request: Box<AttachRequest>,
-        reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
-    ) {
+    fn attach(&mut self, request: Box<AttachRequest>, reply: Reply<AttachedSeat, NotAttached>) {
         let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
-            return answer(reply, Err(NotAttached::TicketUnknown));
+            return answer(reply, Err(RoomError::SecretUnknown));
         };
         if !request.outbox.is_open() {
-            return answer(reply, Err(NotAttached::StreamOver));
+            return answer(reply, Err(RoomError::Refused(NotAttached::StreamOver)));
         }
         if let Some(holder) = request.supersedes.kept_by(self.holder(seat)) {
-            return answer(reply, Err(NotAttached::HeldBy(holder)));
+            return answer(reply, Err(RoomError::Refused(NotAttached::HeldBy(holder))));
         }
         let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
         let handed = self.handed();
@@ -255,7 +250,7 @@ impl Room {
         (seat, charged): (Seat, Key),
         action: SeatAction,
         arrived: Instant,
-    ) -> Acted {
+    ) -> Result<Option<v1::AnswerResult>, ExpressError> {
         let context = &self.context;
         let may_store = |bytes: usize| context.may_store(charged, bytes);
         match action {
@@ -318,13 +313,13 @@ impl Room {
     }
 
     /// Adds a marker, and answers once it is committed.
-    fn mark(&mut self, request: MarkRequest, reply: oneshot::Sender<Option<MarkOutcome>>) {
+    fn mark(&mut self, request: MarkRequest, reply: Reply<v1::Marker, MarkError>) {
         if !self.core.header().owner.matches(&request.secret) {
-            return answer(reply, None);
+            return answer(reply, Err(RoomError::SecretUnknown));
         }
         match self.core.mark(self.now, request.marked) {
             Ok(number) => self.after_commit.push(AfterCommit::Marked(reply, number)),
-            Err(error) => answer(reply, Some(Err(error))),
+            Err(error) => answer(reply, Err(RoomError::Refused(error))),
         }
     }
 }

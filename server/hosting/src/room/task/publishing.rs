@@ -7,12 +7,11 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::{ConnectionId, MAX_EVENTS_KEPT};
-use tokio::sync::oneshot;
 
 use super::{AfterCommit, Room, answer, is_connection};
 use crate::room::markers::MarkerLog;
 use crate::room::message::{
-    AttachRequest, AttachedSeat, NotAttached, SpectateError, SpectateRequest,
+    AttachRequest, AttachedSeat, NotAttached, Reply, RoomError, SpectateError, SpectateRequest,
 };
 use crate::room::subscriber::{
     MAX_PENDING_EVENTS, Publication, SeatConnection, Subscriber, is_urgent,
@@ -104,7 +103,7 @@ impl Room {
 
     fn release(&mut self, release: AfterCommit) {
         match release {
-            AfterCommit::Join(reply, joined) => answer(reply, joined),
+            AfterCommit::Join(reply, joined) => answer(reply, joined.map_err(RoomError::Refused)),
             AfterCommit::Attach(request, seat, connection, reply) => {
                 self.release_attach(*request, seat, connection, reply);
             }
@@ -120,11 +119,12 @@ impl Room {
                     self.always_visit[seat.index()] = true;
                 }
             }
-            AfterCommit::Acted(reply, acted) => answer(reply, Some(acted)),
-            AfterCommit::Hint(reply, hint) => answer(reply, Some(Ok(hint))),
-            AfterCommit::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            AfterCommit::Acted(reply, acted) => answer(reply, acted.map_err(RoomError::Refused)),
+            AfterCommit::Hint(reply, hint) => answer(reply, Ok(hint)),
+            AfterCommit::Closed(reply) => answer(reply, Ok(convert::describe(&self.core))),
             AfterCommit::Left(reply, left) => {
-                answer(reply, Some(left.map(|()| convert::describe(&self.core))));
+                let left = left.map(|()| convert::describe(&self.core));
+                answer(reply, left.map_err(RoomError::Refused));
             }
             AfterCommit::Describe(reply) => {
                 let watching = (self.spectators.iter())
@@ -136,30 +136,35 @@ impl Room {
                 };
                 answer(reply, room);
             }
-            AfterCommit::Spectate(request, reply) => answer(reply, self.spectate(*request)),
+            AfterCommit::Spectate(request, reply) => {
+                let watching = self.spectate(*request);
+                answer(reply, watching.map_err(RoomError::Refused));
+            }
             AfterCommit::Reported(reply, outcome) => {
                 let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));
                 let state = state.map_or_else(v1::TableState::default, Arc::unwrap_or_clone);
                 let response = convert::report_response(&outcome, state);
-                answer(reply, Some(Ok(Box::new(response))));
+                answer(reply, Ok(Box::new(response)));
             }
             AfterCommit::Marked(reply, number) => {
                 let marker = &self.core.markers()[number - 1];
                 let marker = convert::marker_to_proto(number - 1, marker);
-                answer(reply, Some(Ok(marker)));
+                answer(reply, Ok(marker));
             }
             AfterCommit::FollowMarkers(position, reply) => {
                 let core = &self.core;
                 let log = (self.markers).get_or_insert_with(|| Box::new(MarkerLog::new(core)));
                 log.follow(core);
-                let following = log.subscribe(position).ok_or(SpectateError::Full);
-                answer(reply, Some(following));
+                let following = log
+                    .subscribe(position)
+                    .ok_or(RoomError::Refused(SpectateError::Full));
+                answer(reply, following);
             }
             AfterCommit::WatchTable(reply) => {
                 let watching = (self.table.as_ref())
                     .and_then(|table| table.watch(&self.core, self.now))
-                    .ok_or(SpectateError::Full);
-                answer(reply, Some(watching));
+                    .ok_or(RoomError::Refused(SpectateError::Full));
+                answer(reply, watching);
             }
         }
     }
@@ -169,11 +174,11 @@ impl Room {
         request: AttachRequest,
         seat: Seat,
         connection: ConnectionId,
-        reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
+        reply: Reply<AttachedSeat, NotAttached>,
     ) {
         // Its participant may have left or been removed in the same batch.
         if self.core.seat_of_ticket(&request.secret) != Some(seat) {
-            return answer(reply, Err(NotAttached::TicketUnknown));
+            return answer(reply, Err(RoomError::SecretUnknown));
         }
         let participant = self.core.standing(seat).participant;
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
