@@ -14,6 +14,11 @@ pub fn parse(text: &str) -> Result<Spanned<DeTable<'_>>, (usize, String)> {
     })
 }
 
+/// An error of [`parse`] in words.
+pub fn in_words((line, problem): (usize, String)) -> String {
+    format!("line {line}: {problem}")
+}
+
 /// The line of a place in a text, from 1.
 pub(crate) fn line(text: &str, at: usize) -> usize {
     text[..at].matches('\n').count() + 1

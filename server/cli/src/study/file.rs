@@ -47,8 +47,7 @@ pub(super) fn settings(path: &Path) -> Result<v1::StudySettings, CommandError> {
 }
 
 fn parse(text: &str, folder: &Path) -> Result<v1::StudySettings, String> {
-    let table = toml_file::parse(text);
-    let table = table.map_err(|(line, problem)| format!("line {line}: {problem}"))?;
+    let table = toml_file::parse(text).map_err(toml_file::in_words)?;
     let json = object(table.get_ref(), folder)?;
     serde_json::from_value(Value::Object(json)).map_err(|error| error.to_string())
 }

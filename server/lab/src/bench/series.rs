@@ -354,8 +354,7 @@ struct Listed {
 
 impl Plan {
     fn parse(text: &str) -> Result<Self, String> {
-        let table = toml_file::parse(text);
-        let table = table.map_err(|(line, problem)| format!("line {line}: {problem}"))?;
+        let table = toml_file::parse(text).map_err(toml_file::in_words)?;
         let (mut task, mut agents) = (None, Vec::new());
         for (key, value) in table.get_ref() {
             match (key.get_ref().as_ref(), value.get_ref()) {
