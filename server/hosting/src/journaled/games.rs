@@ -4,45 +4,37 @@ use futures::StreamExt as _;
 use tracing::error;
 
 use super::unit::{Journaled, Unit};
-use crate::rooms::{CreateError, Created, NewRoom};
+use crate::rooms::{CreateError, NewRoom};
 use chefshat_room::ids::GameId;
 use chefshat_store::{StoreError, StoredGame};
 
 /// Rooms of a unit that are created at a time.
-const ROOMS_AT_ONCE: usize = 32;
+pub(crate) const ROOMS_AT_ONCE: usize = 32;
 
-/// What has come of the rooms that games need; the others are to be tried again.
-pub(crate) struct Made<G> {
-    /// Games that have a room now.
+/// The games that have a room now, and those whose id another game has. Other rooms are tried again.
+pub(crate) struct CreatedRooms<G> {
     pub(crate) created: Vec<G>,
-    /// Games whose id is that of another one.
     pub(crate) taken: Vec<G>,
 }
 
 impl<U: Journaled> Unit<U> {
-    /// Creates rooms for games, [`ROOMS_AT_ONCE`] of them at a time.
-    pub(crate) async fn create_rooms<G>(
-        &self,
-        wanted: impl Iterator<Item = (G, NewRoom)> + Send,
-    ) -> Vec<(G, Result<Created, CreateError>)> {
-        let creating = wanted.map(|(game, new)| async { (game, self.rooms.create(new).await) });
-        (futures::stream::iter(creating).buffered(ROOMS_AT_ONCE))
-            .collect()
-            .await
-    }
-
-    /// Notes what has come of rooms, and when to try again.
+    /// Creates rooms for games, [`ROOMS_AT_ONCE`] of them at a time, and notes when to try again.
     ///
     /// # Errors
     /// The store failed.
-    pub(crate) fn note_rooms<G>(
+    pub(crate) async fn create_rooms<G>(
         &mut self,
-        made: Vec<(G, Result<Created, CreateError>)>,
-    ) -> Result<Made<G>, StoreError> {
+        wanted: Vec<(G, NewRoom)>,
+    ) -> Result<CreatedRooms<G>, StoreError> {
+        let rooms = &self.rooms;
+        let creating =
+            (wanted.into_iter()).map(|(game, new)| async { (game, rooms.create(new).await) });
+        let creating = futures::stream::iter(creating).buffered(ROOMS_AT_ONCE);
+        let rooms: Vec<_> = creating.collect().await;
         let (mut created, mut taken) = (Vec::new(), Vec::new());
         let id = self.id();
-        for (game, made) in made {
-            match made {
+        for (game, room) in rooms {
+            match room {
                 Ok(_) => created.push(game),
                 Err(CreateError::Store(StoreError::Taken(_))) => taken.push(game),
                 Err(CreateError::Store(error)) => return Err(error),
@@ -50,7 +42,7 @@ impl<U: Journaled> Unit<U> {
             }
         }
         self.has_changed |= !created.is_empty();
-        Ok(Made { created, taken })
+        Ok(CreatedRooms { created, taken })
     }
 
     /// What `read` finds in the record of a game that has ended, if it has one; `unreadable` if this

@@ -12,6 +12,8 @@ mod registry;
 mod table;
 mod unit;
 
+#[cfg(test)]
+pub(crate) use games::ROOMS_AT_ONCE;
 pub(crate) use registry::owner_of;
 pub use registry::{CreateProblem, Registry};
 pub(crate) use unit::New;

@@ -128,15 +128,15 @@ impl StudyTask {
         }
         let without_room = self.without_room.iter().copied();
         let wanted = without_room.filter_map(|number| Some((number, self.new_room(number)?)));
-        let made = self.unit.create_rooms(wanted).await;
-        let made = self.unit.note_rooms(made)?;
-        for number in made.created {
+        let wanted = wanted.collect();
+        let rooms = self.unit.create_rooms(wanted).await?;
+        for number in rooms.created {
             self.without_room.remove(&number);
             self.unit.handle.notify_participant(number);
         }
         // The game was aborted before it began, and then the server was restarted; or its id is taken by
         // another one.
-        for number in made.taken {
+        for number in rooms.taken {
             let participant = self.unit.state.participant(number);
             if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
                 self.end_game(number, &game, Outcome::Aborted);

@@ -12,9 +12,12 @@ use tokio::time::advance;
 
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
+use crate::journaled::ROOMS_AT_ONCE;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_room::ids::{GameId, RoomId};
-use chefshat_store::testing::{FailingStore, TypedUnits as _};
+use chefshat_room::journal::GameHeader;
+use chefshat_room::policy::Durability;
+use chefshat_store::testing::{FailingStore, TypedUnits as _, header};
 use chefshat_store::units::UnitKey;
 use chefshat_store::{MemoryStore, Store};
 
@@ -446,6 +449,57 @@ async fn studies_count_after_a_restart_too() {
         matches!(refused, Err(CreateProblem::Refused(_))),
         "still full"
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn all_who_wait_for_rooms_get_them_after_a_restart_and_a_taken_id_ends_one_game_alone() {
+    // More than are created at a time.
+    const WAITING: u32 = ROOMS_AT_ONCE as u32 + 8;
+    const TAKEN: u32 = 2;
+    let config = ServerConfig {
+        max_rooms: 0,
+        ..ServerConfig::default()
+    };
+    let settings = v1::StudySettings {
+        participants: WAITING,
+        ..settings()
+    };
+    let lab = Lab::with(&config, settings, WAITING as usize).await;
+    let mut present = Vec::new();
+    for number in 1..=WAITING {
+        assert_eq!(lab.open(number).await, Ok(1));
+        present.push(lab.study.present(number, 1).await);
+        assert_eq!(lab.study.consent(at(number, 0)).await, Ok(0));
+    }
+    lab.settled().await;
+    let placed = |study: &StudyHandle, number| {
+        study.read(|study| study.participants()[&number].games[0].placed.clone())
+    };
+    let other = GameHeader {
+        game_id: convert::game_of(&placed(&lab.study, TAKEN)),
+        ..GameHeader::clone(&header(9, Durability::Ephemeral))
+    };
+    let created = lab.store.create(Arc::new(other), Vec::new()).await;
+    let _held = created.expect("its id is free");
+    lab.studies.end();
+
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    let study = studies.get(lab.study.id()).expect("it is resumed");
+    let rooms = &studies.rooms;
+    let has_room = |number| {
+        rooms
+            .get(convert::room_of(&placed(&study, number)))
+            .is_some()
+    };
+    let mut changes = study.changes();
+    let has_ended = || study.read(|study| study.participants()[&TAKEN].games[0].ended.is_some());
+    while !has_ended() {
+        changes.changed().await.expect("the study runs");
+    }
+    for number in 1..=WAITING {
+        assert_eq!(has_room(number), number != TAKEN, "{number}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

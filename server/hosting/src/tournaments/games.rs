@@ -141,15 +141,15 @@ impl TournamentTask {
         }
         let without_room = self.without_room.iter().copied();
         let wanted = without_room.map(|game| (game, self.new_room(game)));
-        let made = self.unit.create_rooms(wanted).await;
-        let made = self.unit.note_rooms(made)?;
-        for game in made.created {
+        let wanted = wanted.collect();
+        let rooms = self.unit.create_rooms(wanted).await?;
+        for game in rooms.created {
             self.without_room.remove(&game);
             self.seen.insert(game);
             self.call(game);
         }
         // They get new ids.
-        for game in made.taken {
+        for game in rooms.taken {
             warn!(tournament = %self.unit.handle.id(), game, "the id of a game is taken");
             self.place(game);
         }
