@@ -7,8 +7,10 @@ import { Code } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import { serverApi } from "../src/api/client";
 import { AbortPolicy, ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { PassScope } from "../src/gen/chefshat/v1/rules_pb";
+import { GetServerInfoResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import {
   StudyHide,
   StudyLabels,
@@ -36,6 +38,7 @@ import { navigate, route } from "../src/router";
 import { forgetAll } from "../src/store";
 import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
+import { NewStudyPage } from "../src/studies/NewStudyPage";
 import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
 import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files";
@@ -255,6 +258,22 @@ test.each([
     [StudyHide.LOG],
   ]);
   expect(settings.seeds).toEqual([new Uint8Array(32).fill(10)]);
+});
+
+test("who removes the last question goes on with the button that adds one", async () => {
+  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
+  await act(() => render(<NewStudyPage />, root));
+  await settle();
+  const removing = () =>
+    [...root.querySelectorAll("button")].filter((one) => one.textContent?.startsWith("Remove this question"));
+  for (const _ of [1, 2]) await press("Add a question");
+  expect(removing()).toHaveLength(2);
+  for (const left of [1, 0]) {
+    removing().at(-1)?.focus();
+    await press(`Remove this question Question ${left + 1}`);
+    expect(removing()).toHaveLength(left);
+    await eventually(() => expect(document.activeElement?.textContent).toBe("Add a question"));
+  }
 });
 
 test("values of enums are written in short, as for the command", async () => {

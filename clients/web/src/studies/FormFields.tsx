@@ -147,9 +147,17 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
 }
 
 function Remove({ words, of, onRemove }: { words: string; of: string; onRemove: () => void }) {
+  const remove = (button: HTMLElement) => {
+    const after = button.closest("fieldset")?.nextElementSibling;
+    onRemove();
+    // The last of several fields is gone, and the focus with it: the button that adds some follows.
+    requestAnimationFrame(() => {
+      if (!button.isConnected) after?.querySelector("button")?.focus();
+    });
+  };
   return (
     <div>
-      <Button look="quiet" onClick={onRemove}>
+      <Button look="quiet" onClick={(event) => remove(event.currentTarget)}>
         {words}
         <span class="visually-hidden"> {of}</span>
       </Button>
