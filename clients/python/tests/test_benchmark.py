@@ -16,6 +16,7 @@ from chefshat import Agent, Decision, benchmark
 pytestmark = pytest.mark.server
 
 PAGE = Path(__file__).parents[3] / "docs" / "benchmark.md"
+SAMPLE = Path(__file__).parents[1] / "samples" / "benchmark" / "never_idle.py"
 # Time limit in seconds.
 WAIT_S = 120
 DEALS = 6
@@ -48,6 +49,23 @@ def test_one_process_plays_all_games(agent: str, real_binary: Path, tmp_path: Pa
         [ended] = [line["event"]["gameEnded"] for line in map(json.loads, lines) if "gameEnded" in line.get("event", {})]
         seed = hashlib.sha256(f"ChefsHat-v1 shift {deal}".encode()).digest()
         assert base64.b64decode(ended["reveal"]["gameSeed"]) == seed
+
+
+def test_the_agent_of_the_reference_results_plays_the_same_games_again(real_binary: Path, tmp_path: Path) -> None:
+    sample = SAMPLE.read_text(encoding="utf-8")
+    one, again = (json.loads(run(real_binary, tmp_path / name, sample).stdout) for name in ("one", "again"))
+    assert one["by_deal"] == again["by_deal"]
+    assert one["deals"] == DEALS
+    assert one["fallback_decisions"] == one["invalid_attempts"] == 0
+    for record in (tmp_path / "one" / "records").glob("*.jsonl"):
+        own = int(record.stem) % 4
+        lines = [json.loads(line) for line in record.read_text().splitlines()]
+        decisions = [line["decision"] for line in lines if "decision" in line and line["decision"].get("seat", 0) == own]
+        passes = [decision for decision in decisions if decision["text"] == "pass"]
+        assert passes
+        for decision in passes:
+            mask = base64.b64decode(decision["actionMask"])
+            assert sum(byte.bit_count() for byte in mask) == 1, "it passes only if it must"
 
 
 def test_what_the_agent_raises_is_shown(agent: str, real_binary: Path, tmp_path: Path) -> None:
