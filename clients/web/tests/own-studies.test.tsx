@@ -260,7 +260,7 @@ test.each([
   expect(settings.seeds).toEqual([new Uint8Array(32).fill(10)]);
 });
 
-test("who removes the last question goes on with the button that adds one", async () => {
+test("removing the last question moves the focus to the button that adds one", async () => {
   vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
   await act(() => render(<NewStudyPage />, root));
   await settle();

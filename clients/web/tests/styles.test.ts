@@ -53,19 +53,14 @@ test("every class is used", () => {
 
 test("every data-part in a style sheet or test exists", () => {
   const parts = new Set(
-    files
-      .filter((name) => name.endsWith(".tsx"))
-      .flatMap((name) =>
-        [...read(name).matchAll(/data-part=(?:"([^"]*)"|\{([^}]*)\})/g)].flatMap(([, plain, dynamic = ""]) =>
-          plain === undefined ? [...dynamic.matchAll(/"([\w-]+)"/g)].map(([, part = ""]) => part) : plain.split(" "),
-        ),
+    components.flatMap((text) =>
+      [...text.matchAll(/data-part=(?:"([^"]*)"|\{([^}]*)\})/g)].flatMap(([, plain, dynamic = ""]) =>
+        plain === undefined ? [...dynamic.matchAll(/"([\w-]+)"/g)].map(([, part = ""]) => part) : plain.split(" "),
       ),
+    ),
   );
   const tests = resolve(SRC, "../tests/browser");
-  const texts = [
-    ...files.filter((name) => name.endsWith(".css")).map(read),
-    ...readdirSync(tests).map((name) => readFileSync(join(tests, name), "utf8")),
-  ];
+  const texts = [...sheetTexts, ...readdirSync(tests).map((name) => readFileSync(join(tests, name), "utf8"))];
   const named = texts.flatMap((text) => [...text.matchAll(/data-part~?="?([\w-]+)/g)].map(([, part = ""]) => part));
   expect([...new Set(named)].filter((part) => !parts.has(part))).toEqual([]);
 });

@@ -150,7 +150,7 @@ function Remove({ words, of, onRemove }: { words: string; of: string; onRemove: 
   const remove = (button: HTMLElement) => {
     const after = button.closest("fieldset")?.nextElementSibling;
     onRemove();
-    // The last of several fields is gone, and the focus with it: the button that adds some follows.
+    // After the last ones are removed, nothing has the focus; the button that adds more comes next.
     requestAnimationFrame(() => {
       if (!button.isConnected) after?.querySelector("button")?.focus();
     });
