@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
 
-/// The key in a file; `None` if there is no such file.
+/// Reads the key in a file; `None` if the file does not exist.
 ///
 /// # Errors
 /// The file contains no key, or cannot be read.
@@ -24,7 +24,8 @@ pub fn read(file: &Path) -> Result<Option<[u8; 32]>, String> {
     }
 }
 
-/// The key in a file. If there is no such file, it is created with a new key, readable only by its owner.
+/// Reads the key in a file. Creates the file, with a new key and readable only by its owner, if it does not
+/// exist.
 ///
 /// # Errors
 /// The file contains no key, or cannot be read or created.

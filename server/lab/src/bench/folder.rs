@@ -42,13 +42,14 @@ struct Manifest {
 }
 
 impl Manifest {
-    fn read(folder: &Path) -> Result<Self, CommandError> {
+    /// The manifest of a folder, and its task.
+    fn read(folder: &Path) -> Result<(Self, &'static Task), CommandError> {
         let manifest: Self = read_json(&folder.join(MANIFEST)).map_err(|error| {
             format!("{error}; a submission is a folder that `chefshat bench run` wrote")
         })?;
         check_agent(folder, &manifest.agent)?;
-        task_of(&manifest.benchmark, &manifest.task)?;
-        Ok(manifest)
+        let task = task_of(&manifest.benchmark, &manifest.task)?;
+        Ok((manifest, task))
     }
 }
 
@@ -64,8 +65,11 @@ pub(super) struct Folder {
 impl Folder {
     /// Opens the folder of a submission with the deals of a key, or with the published ones.
     pub(super) fn open(path: &Path, key: Option<&DealsKey>) -> Result<Self, CommandError> {
-        let manifest = Manifest::read(path)?;
-        let task = task_of(&manifest.benchmark, &manifest.task)?.with_deals(key);
+        let (manifest, task) = Manifest::read(path)?;
+        Self::of(path, manifest, task.with_deals(key))
+    }
+
+    fn of(path: &Path, manifest: Manifest, task: Task) -> Result<Self, CommandError> {
         check_deals(path, manifest.deals_commitment.as_ref(), &task)?;
         Ok(Self {
             path: path.to_owned(),
@@ -100,7 +104,7 @@ impl Folder {
         };
         let file = path.join(MANIFEST);
         if file.exists()
-            && let earlier = Manifest::read(path)?
+            && let (earlier, _) = Manifest::read(path)?
             && folder.played() > 0
         {
             check_deals(path, earlier.deals_commitment.as_ref(), task)?;
@@ -211,8 +215,9 @@ impl Folder {
 /// is marked.
 pub(super) fn read_result(path: &Path, key: Option<&DealsKey>) -> Result<TaskResult, CommandError> {
     if path.is_dir() {
-        let has_hidden = Manifest::read(path)?.deals_commitment.is_some();
-        return Folder::open(path, key.filter(|_| has_hidden))?.check();
+        let (manifest, task) = Manifest::read(path)?;
+        let key = key.filter(|_| manifest.deals_commitment.is_some());
+        return Folder::of(path, manifest, task.with_deals(key))?.check();
     }
     let mut result: TaskResult = read_json(path)?;
     check_agent(path, &result.agent)?;
