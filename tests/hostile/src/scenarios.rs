@@ -31,7 +31,7 @@ const ADDRESSES: u32 = 100;
 /// Connections of the server besides the idle ones.
 const OTHERS: u32 = 100;
 /// How long the rooms may take until all of them play, and until their last games have ended.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(300);
 /// Number of memory samples of a soak.
 const SAMPLES: u32 = 360;
 /// Number of lines about the progress of a soak.

@@ -11,8 +11,9 @@ use serde_json::Value;
 /// Widest line of a table.
 const COLUMNS: usize = 100;
 
-/// How long a test waits for something that is certain to happen.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How long a test waits for something that is certain to happen. Games of built-in agents alone
+/// give way to all else that the machine does.
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Waits until a condition holds.
 pub(super) fn until(what: &str, holds: impl Fn() -> bool) {
