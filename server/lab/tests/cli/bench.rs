@@ -104,10 +104,10 @@ fn every_task_can_be_hosted() {
 fn a_run_resumes_and_records_that_do_not_count_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("greedy");
-    let whole = run("shift", &folder, &["--agent", "greedy"]);
+    let whole = run("small_deck", &folder, &["--agent", "greedy"]);
     let record = |deal: usize| folder.join("records").join(format!("{deal:04}.jsonl"));
     fs::remove_file(record(2)).unwrap();
-    let again = run("shift", &folder, &["--agent", "greedy"]);
+    let again = run("small_deck", &folder, &["--agent", "greedy"]);
     assert_eq!(again.stdout, whole.stdout);
     assert!(
         again.stderr.contains("3 games, 1 are played now"),
