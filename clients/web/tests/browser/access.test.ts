@@ -45,7 +45,7 @@ test("a host and a guest play with tokens of their own, which no address or invi
 });
 
 test("a person plays a complete Shift with a link for players, while one with a link for spectators watches", async () => {
-  const { roomId, code } = await newRoom(closed, { seats: ["person", "greedy", "random", "greedy"], faces: 9 });
+  const { roomId, code } = await newRoom(closed, { seats: ["person", "greedy", "random", "greedy"], faces: 5 });
   const watcher = await person(browser);
   await watcher.page.goto(`${closed.url}/watch/${roomId}#token=${await closed.tokenFor("spectator")}`);
   const player = await person(browser);

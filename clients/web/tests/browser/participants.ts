@@ -33,7 +33,7 @@ export async function newStudy(server: Server, changed: MessageInitShape<typeof 
   const condition = (id: string, level: string, agent: string, name: string) => ({
     id,
     levels: { warmth: level },
-    rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+    rules: { preset: "paper", faces: 5, stop: { case: "targetShifts" as const, value: 1 } },
     policy: { decisionTimeMs: 3_600_000, paceMs: 0 },
     seats: Array.from({ length: others }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent }, name })),
     robotBehaviour: `${level} nods`,

@@ -13,7 +13,7 @@ const OPPONENTS = ["greedy", "random", "greedy"];
 useStage();
 
 test("a person plays a complete Shift by clicking, and continues after a reload", async () => {
-  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 5 });
   const { page, faults } = await person(browser);
   await sitDown(page, server, code, "Rosa");
   let reloads = 0;
@@ -77,7 +77,7 @@ test("a server that has been updated says so, never over a decision, and a new p
 
 test("a person plays a complete game with the keyboard alone, and hears all that happens in its order", async () => {
   const names = ["Rosa", "greedy", "random", "trained"];
-  const { roomId, code } = await newRoom(server, { seats: ["person", ...names.slice(1)], faces: 9, shifts: 2 });
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...names.slice(1)], faces: 5, shifts: 2 });
   const { page, faults } = await person(browser);
   const heard = await hearing(page);
   await page.goto(`${server.url}/join/${code}`);
@@ -179,7 +179,7 @@ test("Food Fight and both gifts of the Chef are decided by keyboard, and no card
 });
 
 test("a game resumes after a server crash", async () => {
-  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 7 });
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 5 });
   const { page } = await person(browser);
   await sitDown(page, server, code, "Rosa");
   let restarts = 0;
@@ -198,7 +198,7 @@ test("a game resumes after a server crash", async () => {
 });
 
 test("two people in two browsers and two agents play in one room to its end", async () => {
-  const { roomId, code } = await newRoom(server, { seats: ["person", "agent", "person", "agent"], faces: 7 });
+  const { roomId, code } = await newRoom(server, { seats: ["person", "agent", "person", "agent"], faces: 5 });
   const other = await startBrowser();
   try {
     const rosa = await person(browser);

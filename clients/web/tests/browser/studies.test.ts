@@ -150,7 +150,7 @@ test.each([
 ])("%s", async (_, hide, expected) => {
   const condition = {
     id: "one",
-    rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+    rules: { preset: "paper", faces: 5, stop: { case: "targetShifts" as const, value: 1 } },
     policy: { decisionTimeMs: 3_600_000, paceMs: 0 },
     seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: "random" } })),
     hide,
@@ -298,7 +298,7 @@ test("people of a panel take part by the open link, once each, and go on where t
   };
   const condition = {
     id: "one",
-    rules: { preset: "paper", faces: 8 },
+    rules: { preset: "paper", faces: 5 },
     seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: "random" } })),
   };
   const deletesAtMs = BigInt(Date.UTC(2031, 11, 30, 11));

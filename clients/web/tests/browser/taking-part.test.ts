@@ -19,7 +19,7 @@ async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id:
       name: "Friday league",
       format: TournamentFormat.SWISS,
       rounds,
-      rules: { preset: "paper", stop: { case: "targetShifts", value: 1 } },
+      rules: { preset: "paper", faces: 5, stop: { case: "targetShifts", value: 1 } },
       policy: { decisionTimeMs: 3_600_000, paceMs: 0, spectators: true },
       builtInAgents: ["greedy", "random", "random"],
       startWhenJoined,
