@@ -49,6 +49,17 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
         assert trainer.training.progress.decisions == 16 * 16
 
 
+def test_a_coalition_is_evaluated_with_its_partner(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "pair.safetensors"
+    small = ["--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "1", "--evaluation-games", "2"]
+    common = ["ppo", "--out", str(out), "--address", real_address, "--decisions", "64", "--name", "pair", "--json", *small]
+    assert command.main([*common, "--coalition"]) == 1
+    assert "--coalition needs --opponent-games" in json.loads(capsys.readouterr().out)["message"]
+    assert command.main([*common, "--games", "0", "--opponent-games", "8", "--opponents", "random", "--coalition"]) == 0
+    trained = json.loads(capsys.readouterr().out)
+    assert [one["opponents"] for one in trained["evaluations"]] == [["greedy"] * 3, ["random"] * 3, ["random", "pair", "random"]]
+
+
 @pytest.mark.slow
 def test_some_games_may_be_against_a_past_self(real_address: str, tmp_path: Path) -> None:
     rules = full_rules({**SMALL, "players": 3}, real_address)

@@ -1,14 +1,17 @@
-"""Advantages compared with a plain loop over each seat's chain, and rewards of places."""
+"""Advantages compared with a plain loop over each seat's chain, rewards of places, and those of a coalition."""
 
 import itertools
 from collections import defaultdict
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from chefshat.learn.self_play import Ends, Floats, Rollout, advantages, place_rewards
+from chefshat.learn.features import num_actions
+from chefshat.learn.self_play import Collector, Ends, Floats, Rollout, advantages, place_rewards
+from chefshat.vector import VectorEnv
 
-STEPS, GAMES, PLAYERS = 40, 6, 4
+STEPS, GAMES, PLAYERS, FACES = 40, 6, 4, 11
 
 
 def made_up(seed: int) -> tuple[Rollout, Floats]:
@@ -30,6 +33,11 @@ def made_up(seed: int) -> tuple[Rollout, Floats]:
         ends=ends,
     )
     return rollout, chance.normal(size=shape).astype(np.float32)
+
+
+def first_legal(inputs: Floats) -> tuple[npt.NDArray[np.integer], Floats]:
+    """Takes the first legal action."""
+    return (inputs[:, -num_actions(FACES) :] > 0).argmax(axis=1), np.zeros(len(inputs), np.float32)
 
 
 def plain(rollout: Rollout, estimates: Floats, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
@@ -77,3 +85,21 @@ def test_place_rewards_add_up_to_zero() -> None:
     worth = place_rewards([5, 3, 1, 0])
     np.testing.assert_allclose(worth, [0.55, 0.15, -0.25, -0.45], rtol=1e-6)
     assert worth.sum() == pytest.approx(0, abs=1e-6)
+
+
+def test_a_coalition_has_the_points_of_both(anywhere: str | None) -> None:
+    settings = {"episode": "shift", "client_seats": [0, 2], "seed": 3, "skip_forced": True}
+    ends = []
+    for coalition in (1, 2):
+        with VectorEnv(anywhere, 16, **settings) as env:  # type: ignore[arg-type]
+            found = Collector(env, 16, 120, coalition=coalition).collect(first_legal).ends
+            columns = zip(*((end.games, end.seats, end.rewards) for end in found), strict=True)
+            ends.append([np.concatenate(column) for column in columns])
+    (games, seats, own), (same_games, same_seats, shared) = ends
+    np.testing.assert_array_equal(games, same_games)
+    np.testing.assert_array_equal(seats, same_seats)
+    assert len(seats) > 40
+    assert list(seats) == [0, 2] * (len(seats) // 2)
+    np.testing.assert_allclose(shared[::2], (own[::2] + own[1::2]) / 2)
+    np.testing.assert_array_equal(shared[::2], shared[1::2])
+    assert min(shared) < 0 < max(shared)

@@ -55,7 +55,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan = command.add_argument_group("plan (stored in the checkpoint)")
     add_evaluations(plan)
     plan.add_argument("--games", type=natural, default=256, help="parallel games of self-play; 0: learn a best response")
-    plan.add_argument("--opponent-games", type=natural, default=0, help="further games with one seat against built-in agents")
+    plan.add_argument("--opponent-games", type=natural, default=0, help="further games with one seat against other agents")
     plan.add_argument(
         "--opponents",
         nargs="+",
@@ -63,6 +63,14 @@ def _ppo(command: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="who plays the other seats of these: built-in agents, network files or opponents of plug-ins (with chefshat-paper "
         "club:module.path:Class), one or one for each seat; for instance past.safetensors trained greedy",
+    )
+    plan.add_argument(
+        "--coalition",
+        action=Given,
+        nargs=0,
+        const=True,
+        default=False,
+        help="play two seats of these, 0 and 2, for the points of both",
     )
     plan.add_argument(
         "--opponent-python",

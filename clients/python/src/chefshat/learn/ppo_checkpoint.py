@@ -68,8 +68,9 @@ class Plan:
 
     Attributes:
         games: parallel games of self-play; 0: only those against the opponents, for a best response to them.
-        opponent_games: further games, in which the policy plays only seat 0.
+        opponent_games: further games, in which the policy plays only seat 0, or with `coalition` the seats 0 and 2.
         opponents: who plays the other seats of these, one for all or one for each.
+        coalition: both seats have the mean of their rewards.
         value_updates: first updates, which learn only the value network.
         steps: decisions in each game between two updates.
         epochs: passes over the samples of an update.
@@ -87,6 +88,7 @@ class Plan:
     games: int = 256
     opponent_games: int = 0
     opponents: tuple[Opponent, ...] = (Opponent("greedy"),)
+    coalition: bool = False
     value_updates: int = 0
     steps: int = 128
     epochs: int = 2

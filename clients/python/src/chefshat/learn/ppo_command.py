@@ -20,7 +20,7 @@ from tqdm import tqdm
 from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network, plugins, ppo_checkpoint, runs, training_log
-from chefshat.learn.evaluation import Evaluation
+from chefshat.learn.evaluation import Evaluation, OneOpponent
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Opponent, Plan, Training
@@ -28,6 +28,9 @@ from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
 from chefshat.learn.training_log import Progress
+
+# A coalition has the seats 0 and 2.
+COALITION_PLAYERS = 3
 
 
 def run(options: argparse.Namespace) -> int:
@@ -62,12 +65,15 @@ def _start(options: argparse.Namespace) -> Training:
     if options.games + options.opponent_games == 0:
         raise ValueError("there are no games to play: --games or --opponent-games must be at least 1")
     rules = runs.full_rules(options.rules, join_options.server_if_any(options))
+    if options.coalition and (options.opponent_games == 0 or rules.players < COALITION_PLAYERS):
+        raise ValueError(f"--coalition needs --opponent-games, and rules for at least {COALITION_PLAYERS} players")
     begin_with = None if options.begin_with is None else _policy(options.begin_with, rules)
     widths = (options.width,) * 2 if begin_with is None else tuple(len(layer.bias) for layer in begin_with.layers[:-1])
     plan = Plan(
         games=options.games,
         opponent_games=options.opponent_games,
         opponents=tuple(_opponent(name, options) for name in options.opponents),
+        coalition=options.coalition,
         value_updates=options.value_updates,
         steps=options.steps,
         epochs=options.epochs,
@@ -169,11 +175,13 @@ def _evaluate(
     began = time.monotonic()
     training = trainer.training
     plan = training.plan.checked()
-    further = trainer.opponents if plan.opponent_games else ()
+    learned = training.network(options.name)
+    further: list[OneOpponent] = list(trainer.opponents) if plan.opponent_games else []
+    if plan.coalition:
+        others = further if len(further) > 1 else further * (training.rules.players - 2)
+        further = [others[0], learned, *others[1:]]
     address = join_options.server_if_any(options)
-    evaluations = training_log.evaluate_all(
-        training.network(options.name), plan.evaluation_games, training.rules, address, further=further
-    )
+    evaluations = training_log.evaluate_all(learned, plan.evaluation_games, training.rules, address, further=further)
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)
     trainer.training = dataclasses.replace(training, progress=progress)
     points = {",".join(evaluation.opponents): evaluation.points for evaluation in evaluations}

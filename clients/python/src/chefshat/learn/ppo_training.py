@@ -1,7 +1,7 @@
 """Training by self-play: plays games and learns from them, in turns.
 
-The policy plays all seats of most games and, if the plan says so, one seat against built-in agents in others. Collecting games is
-in `self_play`, learning in `ppo`, files are in `ppo_checkpoint`, the command is in `ppo_command`.
+The policy plays all seats of most games and, if the plan says so, one or two seats against other agents in others. Collecting games
+is in `self_play`, learning in `ppo`, files are in `ppo_checkpoint`, the command is in `ppo_command`.
 """
 
 import dataclasses
@@ -51,15 +51,16 @@ class Trainer:
         try:
             for opponent in plan.opponents if plan.opponent_games else ():
                 self.opponents.append(seated(opponent))
-            alone = {"client_seats": [0], "opponents": self.opponents}
-            kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {}), (plan.opponent_games, alone)]
-            for number, (games, others) in enumerate(kinds):
+            seats = [0, 2] if plan.coalition else [0]
+            against = {"client_seats": seats, "opponents": self.opponents}
+            kinds: list[tuple[int, int, dict[str, Any]]] = [(plan.games, 1, {}), (plan.opponent_games, len(seats), against)]
+            for number, (games, coalition, others) in enumerate(kinds):
                 if games == 0:
                     continue
                 settings = {"episode": "shift", "skip_forced": True, "rules": training.rules, **others}
                 # Seeds of trainings are below 2^31, so no two environments share one.
                 self._envs.append(VectorEnv(address, games, seed=first_seed + SEED_STEP // 2 * number, **settings))
-                self._collectors.append(Collector(self._envs[-1], games, plan.steps))
+                self._collectors.append(Collector(self._envs[-1], games, plan.steps, coalition=coalition))
         except BaseException:
             self.close()
             raise

@@ -26,7 +26,7 @@ class Ends:
     Attributes:
         games: (E,) the game.
         seats: (E,) the seat.
-        rewards: (E,) the reward for the place taken.
+        rewards: (E,) the reward for the place taken; in a coalition, the mean of its seats' rewards.
     """
 
     games: npt.NDArray[np.uint32]
@@ -68,9 +68,17 @@ class Collector:
     Its environment has episodes of a Shift, asks for all decisions and skips forced ones.
     """
 
-    def __init__(self, env: VectorEnv, games: int, steps: int) -> None:
-        """Starts with the environment's first batch."""
+    def __init__(self, env: VectorEnv, games: int, steps: int, *, coalition: int = 1) -> None:
+        """Starts with the environment's first batch.
+
+        Args:
+            env: the environment, of `games` games.
+            games: n.
+            steps: decisions in each game of a rollout.
+            coalition: number of the client's seats if all of them have the mean of their rewards; 1: each has its own.
+        """
         self._env = env
+        self._coalition = coalition
         self._batch: Batch = env.reset()
         self._rewards = place_rewards(env.rules.points)
         width = features.table_width(env.players, env.faces)
@@ -111,7 +119,11 @@ class Collector:
 
     def _ends(self, batch: Batch) -> Ends:
         endings = batch.endings
-        return Ends(endings.games, endings.seats, self._rewards[endings.places_taken.astype(np.intp) - 1])
+        rewards = self._rewards[endings.places_taken.astype(np.intp) - 1]
+        if self._coalition > 1:
+            # The seats of one end follow each other.
+            rewards = rewards.reshape(-1, self._coalition).mean(axis=1).repeat(self._coalition)
+        return Ends(endings.games, endings.seats, rewards)
 
 
 def advantages(

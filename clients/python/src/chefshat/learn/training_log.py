@@ -98,10 +98,11 @@ def evaluate_all(
         address: where the games are played; see `VectorEnv`.
         further: one more table of opponents, one for all seats or one for each; empty: none.
     """
-    tables: list[tuple[OneOpponent, ...]] = [*((name,) for name in OPPONENTS), *([tuple(further)] if further else [])]
+    tables: list[tuple[OneOpponent, ...]] = [(name,) for name in OPPONENTS]
+    if further and tuple(further) not in tables:
+        tables.append(tuple(further))
     return [
-        evaluate(network, opponents, games=games, seed=runs.EVALUATION_SEED, rules=rules, address=address)
-        for opponents in dict.fromkeys(tables)
+        evaluate(network, opponents, games=games, seed=runs.EVALUATION_SEED, rules=rules, address=address) for opponents in tables
     ]
 
 
