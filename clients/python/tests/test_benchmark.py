@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from waiting import LIMIT_S
 
 from chefshat import Agent, Decision, benchmark
 
@@ -17,8 +18,6 @@ pytestmark = pytest.mark.server
 
 PAGE = Path(__file__).parents[3] / "docs" / "benchmark.md"
 SAMPLE = Path(__file__).parents[1] / "samples" / "benchmark" / "never_idle.py"
-# Time limit in seconds.
-WAIT_S = 120
 DEALS = 6
 
 
@@ -26,7 +25,7 @@ def run(real_binary: Path, folder: Path, program: str) -> "subprocess.CompletedP
     """Plays the first deals of a task with a program in Python."""
     bench = [str(real_binary), "bench", "run", "shift", "--json", "--deals", str(DEALS), "--out", str(folder)]
     command = [*bench, "--name", "first", "--", sys.executable, "-c", program]
-    return subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S)
+    return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
 
 
 @pytest.fixture(scope="module")

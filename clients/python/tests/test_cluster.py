@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from waiting import LIMIT_S
 
 from chefshat import pb
 from chefshat.learn import network, ppo_checkpoint, runs
@@ -21,8 +22,6 @@ from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo_checkpoint import Plan
 
 SAMPLE = Path(__file__).resolve().parents[1] / "samples" / "cluster" / "rllib_ppo.py"
-# Time limit in seconds: Ray starts several processes.
-LIMIT_S = 300
 
 
 class Runner:

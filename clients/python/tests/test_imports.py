@@ -6,12 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from waiting import LIMIT_S
 
 import chefshat
 
 SOURCE = Path(chefshat.__file__).parents[1]
-# Time limit in seconds.
-WAIT_S = 60
 
 # Prints which of the modules named by the arguments a program has loaded.
 LOADED = "\nimport sys\nprint(*sorted(name for name in sys.argv[1:] if name in sys.modules))"
@@ -22,7 +21,7 @@ WITHOUT_GRPC = "import sys\nsys.modules['grpc'] = None\n"
 def run(program: str, *arguments: str) -> str:
     """Runs a program in a fresh interpreter and returns its output."""
     command = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(SOURCE)!r})\n{program}", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import LIMIT_S
 
 import chefshat
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples" / "learning"
 LITTLE = ("--decisions", "256", "--games", "4", "--steps", "16", "--evaluation", "8")
-# Time limit of a sample, seconds.
-LIMIT_S = 300
 
 
 @pytest.mark.parametrize(("name", "needs"), [("ppo_jax", "jax"), ("ppo_torch", "torch")])

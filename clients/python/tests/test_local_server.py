@@ -10,14 +10,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import ChefsHatError, LocalServer, local_server
 from chefshat.local_server import BINARY
 
 SOURCE = str(Path(chefshat.__file__).parents[1])
-# Time limit in seconds.
-WAIT_S = 60
 
 # Prints the address and the process id of the shared server, then ends in a given way.
 ORPHAN = """
@@ -170,13 +169,13 @@ def test_the_shared_server_stops_with_its_process(way: str) -> None:
     if not os.environ.get(BINARY):
         pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}
-    done = subprocess.run([sys.executable, "-c", ORPHAN, way], capture_output=True, text=True, timeout=WAIT_S, env=environment)
+    done = subprocess.run([sys.executable, "-c", ORPHAN, way], capture_output=True, text=True, timeout=LIMIT_S, env=environment)
     codes = {"return": 0, "kill": -signal.SIGKILL}
     assert done.returncode == codes.get(way, done.returncode)
     _, process = done.stdout.split()
     # The server's parent has ended, so the test can only wait for its absence.
     watch = f"while kill -0 {process} 2>/dev/null; do sleep 0.05; done"
-    subprocess.run(["sh", "-c", watch], check=True, timeout=WAIT_S)
+    subprocess.run(["sh", "-c", watch], check=True, timeout=LIMIT_S)
 
 
 @pytest.mark.server
@@ -185,7 +184,7 @@ def test_no_call_is_left_when_the_interpreter_ends() -> None:
     if not os.environ.get(BINARY):
         pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}
-    done = subprocess.run([sys.executable, "-c", LEFT_OPEN], capture_output=True, text=True, timeout=WAIT_S, env=environment)
+    done = subprocess.run([sys.executable, "-c", LEFT_OPEN], capture_output=True, text=True, timeout=LIMIT_S, env=environment)
     assert (done.stdout.split(), done.stderr) == (["open:", "3", "left:", "0"], "")
 
 

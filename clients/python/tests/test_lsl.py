@@ -14,6 +14,7 @@ from subprocess import PIPE, Popen
 from typing import Any, cast
 
 import pytest
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import Client, RandomAgent, pb
@@ -27,8 +28,6 @@ from chefshat import lsl  # noqa: E402 (needs pylsl)
 
 pytestmark = pytest.mark.server
 
-# Time limit for what must happen, seconds.
-WAIT_S = 120.0
 # How far the time of day, which systems correct, may be off during a game, seconds.
 TIME_OF_DAY_S = 1.0
 # Events have times in milliseconds.
@@ -41,17 +40,17 @@ WITH_SEAT = {name for name in KINDS if "seat" in type(getattr(pb.GameEvent(), na
 
 def inlet(source: str) -> Any:
     """An inlet that receives the stream with this id."""
-    found = pylsl.resolve_byprop("source_id", source, timeout=WAIT_S)
+    found = pylsl.resolve_byprop("source_id", source, timeout=LIMIT_S)
     assert found, f"no stream {source!r}"
     opened = pylsl.StreamInlet(found[0])
-    opened.open_stream(timeout=WAIT_S)
+    opened.open_stream(timeout=LIMIT_S)
     return opened
 
 
 def received(stream: Any) -> Iterator[tuple[dict[str, Any], float]]:
     """The markers of a stream and their times, until the game is over."""
     while True:
-        sample, at = stream.pull_sample(timeout=WAIT_S)
+        sample, at = stream.pull_sample(timeout=LIMIT_S)
         assert sample is not None, "no marker"
         code, event = sample
         marker = json.loads(event)
@@ -92,7 +91,7 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
         room, tickets, _ = seated(client)
         markers = lsl.MarkerStream(client, room.room_id)
         stream = inlet(markers.source)
-        assert markers.wait_for_recorder(WAIT_S)
+        assert markers.wait_for_recorder(LIMIT_S)
         playing = threads.submit(client.play_many, {ticket: RandomAgent(seat) for seat, ticket in enumerate(tickets)})
 
         def watch() -> None:
@@ -114,7 +113,7 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
             # A spectator sees no hands.
             assert "hands" not in marker.get("shiftStarted", {})
         check_times(client, room, sent, markers.clock.reading.error)
-        description = stream.info(timeout=WAIT_S).desc().child("game")
+        description = stream.info(timeout=LIMIT_S).desc().child("game")
         assert description.child_value("room_id") == room.room_id
         assert description.child_value("game_id") == room.game_id
         assert description.child_value("viewer") == "spectator"
@@ -128,19 +127,19 @@ def test_the_clock_is_read_again_and_keeps_the_better_reading(real_address: str)
         room = client.rooms.create("clock").room
         with RoomClock(client, room.room_id, local=pylsl.local_clock, interval_s=0.01) as clock:
             first = clock.reading
-            until = time.monotonic() + WAIT_S
+            until = time.monotonic() + LIMIT_S
             while clock.readings < 10 and time.monotonic() < until:
                 time.sleep(0.01)
             assert clock.readings >= 10
-            assert clock.reading.error <= first.error + DRIFT * WAIT_S
+            assert clock.reading.error <= first.error + DRIFT * LIMIT_S
             now = clock.reading
-            assert abs(now.local(0) - first.local(0)) <= now.error + first.error + DRIFT * WAIT_S
+            assert abs(now.local(0) - first.local(0)) <= now.error + first.error + DRIFT * LIMIT_S
 
 
 def test_a_seat_sends_what_it_sees(real_address: str) -> None:
     with chefshat.Client(real_address) as client, ThreadPoolExecutor(1) as threads:
         room, tickets, _ = seated(client)
-        marked = lsl.MarkedAgent(RandomAgent(1), client, wait_s=WAIT_S)
+        marked = lsl.MarkedAgent(RandomAgent(1), client, wait_s=LIMIT_S)
         agents = {tickets[0]: marked, **{ticket: RandomAgent(2) for ticket in tickets[1:]}}
         playing = threads.submit(client.play_many, agents)
         stream = inlet(f"chefshat {room.game_id} seat 0")
@@ -167,7 +166,7 @@ def test_the_command_sends_a_room_by_its_join_code(real_address: str, processes:
         sent = [int(marker["sequence"]) for marker, _ in received(stream)]
         playing.join()
         stream.close_stream()
-        out, err = process.communicate(timeout=WAIT_S)
+        out, err = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 0, err
         assert out == ""
         assert "the game is over" in err
@@ -254,7 +253,7 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
                 clock = owner.read_clock(game.room_id, local=pylsl.local_clock)
                 check_times(owner, room, sent, max(clock.error, WANTED_ERROR_S))
         studies.CloseStudy(pb.CloseStudyRequest(study_id=study_id, owner_token=owner_token))
-        _, said = processes[-1].communicate(timeout=WAIT_S)
+        _, said = processes[-1].communicate(timeout=LIMIT_S)
         assert processes[-1].returncode == 0, said
         assert "participant 1 has finished" in said
         channel.close()

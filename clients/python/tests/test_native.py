@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import ChefsHatError, VectorEnv, pb
@@ -23,8 +24,6 @@ from chefshat.vector import Batch
 chefshat_native = pytest.importorskip("chefshat_native")
 
 SOURCE = Path(chefshat.__file__).parents[1]
-# Time limit in seconds.
-WAIT_S = 60
 # Pause in seconds in which the other of two threads may call.
 BETWEEN_CALLS_S = 0.001
 
@@ -227,7 +226,7 @@ def test_threads_play_side_by_side() -> None:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(WAIT_S)
+        thread.join(LIMIT_S)
     assert len(found) == 4
     assert all(found[number] == found[0] for number in found)
 
@@ -293,13 +292,13 @@ def test_two_threads_on_one_env_do_not_end_it() -> None:
     with VectorEnv(**options) as env:
         looking = threading.Thread(target=look)
         looking.start()
-        until = time.monotonic() + WAIT_S
+        until = time.monotonic() + LIMIT_S
         while (steps < 20 or not refusals) and time.monotonic() < until:
             actions = env.batch.masks.argmax(axis=1)
             again(lambda: env.step(actions))  # noqa: B023 - Called at once.
             steps += 1
         done.set()
-        looking.join(WAIT_S)
+        looking.join(LIMIT_S)
         assert set(refusals) == {"GAMES_IN_USE"}
         with VectorEnv(**options) as alone:
             for _ in range(steps):
@@ -336,7 +335,7 @@ def test_a_forked_process_plays_on() -> None:
     paths = os.pathsep.join([str(SOURCE), *sys.path])
     environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONPATH": paths}
     done = subprocess.run(
-        [sys.executable, "-c", FORKED], env=environment, capture_output=True, text=True, timeout=WAIT_S, check=False
+        [sys.executable, "-c", FORKED], env=environment, capture_output=True, text=True, timeout=LIMIT_S, check=False
     )
     assert done.returncode == 0, done.stderr
     lines = dict(line.split() for line in done.stdout.splitlines())
@@ -350,7 +349,7 @@ def test_games_in_process_need_neither_grpc_nor_a_server() -> None:
         "print(env, 'chefshat.channels' in sys.modules)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program, str(SOURCE), *sys.path], capture_output=True, text=True, timeout=WAIT_S, check=False
+        [sys.executable, "-c", program, str(SOURCE), *sys.path], capture_output=True, text=True, timeout=LIMIT_S, check=False
     )
     assert "in process" in done.stdout, done.stderr
     assert done.stdout.endswith("False\n")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from real_server import RealServer
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import Agent, Backoff, Decision, RandomAgent, SeatInfo, SeatResult, aio, pb
@@ -21,8 +22,6 @@ pytestmark = pytest.mark.server
 PATIENT = Backoff(first_s=0.005, max_s=0.05, attempts=2000)
 # Acknowledged decisions of the game after which the server is killed.
 KILLS = (5, 20, 21, 60)
-# Time limit in seconds.
-WAIT_S = 120.0
 
 Agents = dict[str, Agent]
 Player = Callable[[str, Agents], dict[str, SeatResult]]
@@ -59,7 +58,7 @@ class Ledger:
             count = len(self.accepted)
         if count in self.reached:
             self.reached[count].set()
-            assert self.killed[count].wait(WAIT_S)
+            assert self.killed[count].wait(LIMIT_S)
 
 
 class Noting(RandomAgent):
@@ -99,11 +98,11 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         playing = threading.Thread(target=lambda: results.update(play(server.address, dict(agents))))
         playing.start()
         for count in KILLS:
-            assert ledger.reached[count].wait(WAIT_S)
+            assert ledger.reached[count].wait(LIMIT_S)
             server.kill()
             ledger.killed[count].set()
             server.start()
-        playing.join(WAIT_S)
+        playing.join(LIMIT_S)
         assert not playing.is_alive()
         with chefshat.Client(server.address) as client:
             lines = list(client.records.read(room.room.game_id))
@@ -156,11 +155,11 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
             tickets = [client.tournaments.join(made.join_code, name, max_games=2).ticket for name in names]
         playing = [pool.submit(play, ticket) for ticket in tickets]
         for count in KILLS:
-            assert ledger.reached[count].wait(WAIT_S)
+            assert ledger.reached[count].wait(LIMIT_S)
             server.kill()
             ledger.killed[count].set()
             server.start()
-        played = [results.result(WAIT_S) for results in playing]
+        played = [results.result(LIMIT_S) for results in playing]
         with chefshat.Client(server.address) as client:
             games = list(client.tournaments.games(made.tournament.tournament_id))
             recorded = {
@@ -197,7 +196,7 @@ def test_reports_about_a_table_wait_for_the_server(tmp_path: Path) -> None:
         server.kill()
         waiting = pool.submit(client.tables.report, ticket, answer)
         server.start()
-        second = waiting.result(WAIT_S)
+        second = waiting.result(LIMIT_S)
         assert client.tables.report(ticket, opening, report_id="first").report == first.report
         state = next(client.tables.watch(ticket))
     assert first.verdict == second.verdict == pb.REPORT_VERDICT_ACCEPTED

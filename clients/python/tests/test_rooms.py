@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tqdm import tqdm
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import Agent, Batch, ChefsHatError, Decision, SeatInfo, SeatResult, VectorEnv, pb
@@ -29,8 +30,6 @@ from chefshat.learn.rooms import Command
 pytestmark = pytest.mark.server
 
 DEALS = 2
-# Time limit in seconds.
-WAIT_S = 60
 # Two Shifts: with roles, an exchange and special actions.
 RULES = {"preset": "paper", "target_shifts": 2}
 
@@ -193,7 +192,7 @@ class Meets(Agent):
         Meets.running -= 1
 
     async def decide(self, request: Decision) -> int:
-        async with asyncio.timeout(WAIT_S):
+        async with asyncio.timeout(LIMIT_S):
             while Meets.most < Meets.wanted:
                 await asyncio.sleep(0.01)
         return Lowest().decide(request)
@@ -324,7 +323,7 @@ def test_what_a_program_has_started_ends_with_its_game(real_address: str, tmp_pa
     program = Command(["sh", "-c", f"sleep 600 & echo $! > {shlex.quote(str(started))}; exit 3 # {{code}}{{url}}"])
     with pytest.raises(ChefsHatError, match="exit code 3"):
         evaluate(program, "greedy", games=1, address=real_address)
-    deadline = time.monotonic() + WAIT_S
+    deadline = time.monotonic() + LIMIT_S
     while is_running(int(started.read_text())):
         assert time.monotonic() < deadline
         time.sleep(0.05)
@@ -381,12 +380,12 @@ def test_an_interrupt_ends_everything(
     playing = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     processes.append(playing)
     pid = tmp_path / "pid"
-    deadline = time.monotonic() + WAIT_S
+    deadline = time.monotonic() + LIMIT_S
     while not (pid.exists() and pid.read_text().strip()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     playing.send_signal(signal.SIGINT)
-    _, printed = playing.communicate(timeout=WAIT_S)
+    _, printed = playing.communicate(timeout=LIMIT_S)
     assert playing.returncode == -signal.SIGINT
     assert "KeyboardInterrupt" in printed
     assert not is_running(int(pid.read_text()))

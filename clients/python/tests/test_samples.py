@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from fake_server import FakeServer
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import agent as command
@@ -35,8 +36,6 @@ PRINTED = [
     for block in re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 ]
 SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
-# Time limit of a sample, seconds.
-LIMIT_S = 120
 
 
 def run_python(*arguments: str, folder: Path = PACKAGE) -> str:

@@ -14,6 +14,7 @@ import pytest
 from fake_game import FakeGame, FakeSeat
 from fake_server import FakeServer
 from proxy import Proxy
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import Backoff, ChefsHatError, Decision, RandomAgent, SeatInfo, SeatResult, aio, pb
@@ -22,8 +23,6 @@ from chefshat.participant import MakeAgent
 
 PACKAGE = Path(__file__).resolve().parents[1]
 QUICK = Backoff(first_s=0.001, max_s=0.05, attempts=100)
-# Time limit in seconds.
-LIMIT_S = 120
 GAMES = 6
 
 Item = TypeVar("Item")

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 # Seconds after which a test that hangs fails. Tests do not depend on it otherwise.
-LIMIT_S = 120.0
+LIMIT_S = 300.0
 
 
 def run(coroutine: Coroutine[Any, Any, Result]) -> Result:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import chefshat
 import pytest
-from certificates import issue
+from certificates import PATIENCE_S, issue
 from chefshat.local_server import BINARY, LocalServer
 
 
@@ -73,4 +73,4 @@ def run(*arguments: str | Path, environment: dict[str, str] | None = None) -> su
 def attempt(*arguments: str | Path, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     """Runs a command of the program."""
     command = [os.environ[BINARY], *arguments]
-    return subprocess.run(command, env=os.environ | (environment or {}), capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, env=os.environ | (environment or {}), capture_output=True, text=True, timeout=PATIENCE_S)

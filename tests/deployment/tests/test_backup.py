@@ -5,6 +5,7 @@ import stat
 import time
 from pathlib import Path
 
+from certificates import PATIENCE_S
 from chefshat import Decision, RandomAgent, pb
 from servers import GuardedServer, attempt, run
 
@@ -41,7 +42,7 @@ def test_a_game_resumes_from_a_backup_and_is_signed_by_the_same_key(server: Guar
         over = client.rooms.create("over", rules=SHORT, seats=["greedy"] * 4).room
         list(client.rooms.watch(over.room_id))
         # Its file is written after the game.
-        deadline = time.monotonic() + 300
+        deadline = time.monotonic() + PATIENCE_S
         while not (data / "records" / f"{over.game_id}.jsonl").exists():
             assert time.monotonic() < deadline, "the record of a finished game is never written"
             time.sleep(0.05)
