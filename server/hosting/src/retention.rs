@@ -3,6 +3,7 @@
 //! only then are files deleted. A crash in between leaves nothing behind that the next run does not
 //! delete.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,6 +15,7 @@ use tracing::{error, info, warn};
 use crate::config::KeepGames;
 use crate::rooms::Rooms;
 use chefshat_base::clock::since_epoch_ms;
+use chefshat_store::samples::Undeleted;
 use chefshat_store::{DiskUsage, Keep, StoreError};
 
 /// Games that are deleted in one commit: rooms wait for it.
@@ -24,7 +26,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 const INTERVAL: Duration = Duration::from_secs(600);
 
 /// A file of the data directory with the ids of games whose deletion has begun, one a line. It is
-/// deleted after their files.
+/// deleted when none of their files is left.
 const PRUNING: &str = "pruning";
 
 /// Which games a setting keeps now.
@@ -102,7 +104,9 @@ impl Retention {
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
         let mut pruned = Pruned::default();
-        self.delete(self.left_over()).await?;
+        if let Err(error) = self.delete(self.left_over()).await {
+            error!(%error, "completing an earlier deletion failed");
+        }
         let mut after = 0;
         loop {
             let store = self.rooms.store();
@@ -128,32 +132,41 @@ impl Retention {
         Ok(pruned)
     }
 
-    /// Deletes those of these games that nothing needs, and their files. Returns how many it did.
+    /// Deletes those of these games that nothing needs, and their files. Returns how many it did. Files
+    /// that the file system keeps are tried again by the next run.
     pub(crate) async fn delete(&self, games: Vec<GameId>) -> Result<u64, StoreError> {
         if games.is_empty() {
             return Ok(0);
         }
         let data_dir = self.rooms.record_writer().data_dir();
+        let mut begun: BTreeSet<GameId> = self.left_over().into_iter().collect();
+        begun.extend(&games);
         if let Some(data_dir) = data_dir {
-            let ids: Vec<String> = games.iter().map(GameId::to_string).collect();
-            // A disk that is full must not prevent what frees space.
-            if let Err(error) = std::fs::write(data_dir.join(PRUNING), ids.join("\n")) {
-                warn!(%error, "a crash from here on may leave files of deleted games behind");
+            note(data_dir, &begun);
+        }
+        let asked = games.clone();
+        let (deleted, mut undeleted) = self.rooms.prune_games(games).await?;
+        let count = deleted.len() as u64;
+        if let Some(data_dir) = data_dir {
+            let folder = data_dir.to_path_buf();
+            let deleting = move || {
+                let removed = deleted.into_iter().map(|game| {
+                    let path = jsonl::path_of(&folder, &game.to_string());
+                    let failed = atomic_file::remove(&path).err();
+                    failed.map(|error| (game, error))
+                });
+                removed.flatten().collect::<Undeleted>()
+            };
+            let records = tokio::task::spawn_blocking(deleting).await;
+            undeleted.extend(records.map_err(|error| StoreError::Failed(error.to_string()))?);
+            for (game, error) in &undeleted {
+                warn!(%game, %error, "a file of a deleted game was not deleted; the next run tries again");
             }
+            begun.retain(|game| !asked.contains(game));
+            begun.extend(undeleted.keys());
+            note(data_dir, &begun);
         }
-        let deleted = self.rooms.prune_games(games).await?;
-        if let Some(data_dir) = data_dir {
-            let records = deleted.iter().map(ToString::to_string);
-            let mut paths: Vec<_> = (records)
-                .map(|game| jsonl::path_of(data_dir, &game))
-                .collect();
-            paths.push(data_dir.join(PRUNING));
-            let deleting = move || paths.iter().try_for_each(|path| atomic_file::remove(path));
-            (tokio::task::spawn_blocking(deleting).await)
-                .map_err(|error| StoreError::Failed(error.to_string()))?
-                .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
-        }
-        Ok(deleted.len() as u64)
+        Ok(count)
     }
 
     /// The games whose deletion an earlier run began and may not have completed.
@@ -173,6 +186,20 @@ impl Retention {
                 error!(%error, "deleting old games failed");
             }
         }
+    }
+}
+
+/// Notes the games whose deletion has begun.
+fn note(data_dir: &Path, games: &BTreeSet<GameId>) {
+    let path = data_dir.join(PRUNING);
+    let ids: Vec<String> = games.iter().map(GameId::to_string).collect();
+    let noted = match ids.is_empty() {
+        true => atomic_file::remove(&path),
+        false => std::fs::write(path, ids.join("\n")),
+    };
+    // A disk that is full must not prevent what frees space.
+    if let Err(error) = noted {
+        warn!(%error, "files of deleted games may be left behind");
     }
 }
 
@@ -258,6 +285,20 @@ mod tests {
         std::fs::write(&pruning, format!("{}\n{}", id(1), id(4))).expect("written");
         retention.prune(newest).await.expect("deleted");
         assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 0]);
+        assert!(!pruning.exists());
+
+        // What cannot be deleted holds up nothing else: a folder is no file that could be removed.
+        let stuck = files(5);
+        std::fs::create_dir_all(&stuck[0]).expect("created");
+        for path in [&stuck[1], &files(6)[0]] {
+            std::fs::write(path, "{}").expect("written");
+        }
+        std::fs::write(&pruning, format!("{}\n{}", id(5), id(6))).expect("written");
+        retention.prune(newest).await.expect("what can be");
+        assert_eq!([5, 6].map(left), [1, 0]);
+        assert_eq!(std::fs::read_to_string(&pruning).expect("noted"), id(5));
+        std::fs::remove_dir(&stuck[0]).expect("removed");
+        retention.prune(newest).await.expect("the rest");
         assert!(!pruning.exists());
     }
 }

@@ -44,9 +44,10 @@ pub fn beside(record: &Path, game_id: &str, seat: usize) -> Option<PathBuf> {
 /// Deletes the samples of all seats of a game in a data directory.
 ///
 /// # Errors
-/// The file system failed.
+/// The first failure of the file system, after all others were deleted.
 pub fn delete(data_dir: &Path, game_id: &str) -> io::Result<()> {
-    paths_of(data_dir, game_id).try_for_each(|path| atomic_file::remove(&path))
+    let removed = paths_of(data_dir, game_id).map(|path| atomic_file::remove(&path));
+    removed.collect::<Vec<_>>().into_iter().collect()
 }
 
 /// The files that the samples of a game's seats may have in a data directory.

@@ -13,6 +13,7 @@ use chefshat_proto::v1::SampleChunk;
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::{private, samples};
 use chefshat_room::ids::GameId;
+use tokio::task::JoinError;
 
 /// Most bytes of the samples of one seat: 8 channels, 30 times a second, for more than 15 hours.
 pub(crate) const MAX_SAMPLE_BYTES: u64 = 64 * 1024 * 1024;
@@ -99,6 +100,9 @@ struct StreamEnd {
     channels: Vec<String>,
     last_us: u64,
 }
+
+/// Games whose files could not be deleted, and why.
+pub type Undeleted = BTreeMap<GameId, io::Error>;
 
 impl Samples {
     /// Records samples in a data directory; `None`: nowhere.
@@ -200,22 +204,25 @@ impl Samples {
         }
     }
 
-    /// Deletes the samples of games, and takes no more of them.
+    /// Deletes the samples of games, and takes no more of them. Returns the games of which the file
+    /// system keeps some.
     ///
     /// # Errors
-    /// The file system failed.
-    pub async fn delete(self: &Arc<Self>, games: Vec<GameId>) -> io::Result<()> {
+    /// It is unknown which were deleted.
+    pub async fn delete(self: &Arc<Self>, games: Vec<GameId>) -> Result<Undeleted, JoinError> {
         let Some(data_dir) = self.data_dir.clone() else {
-            return Ok(());
+            return Ok(Undeleted::new());
         };
         let samples = Arc::clone(self);
         let deleting = move || {
             samples.refuse_now(&games);
-            let mut games = games.iter();
-            games.try_for_each(|game| samples::delete(&data_dir, &game.to_string()))
+            let deleted = games.into_iter().map(|game| {
+                let failed = samples::delete(&data_dir, &game.to_string()).err();
+                failed.map(|error| (game, error))
+            });
+            deleted.flatten().collect()
         };
-        let deleted = tokio::task::spawn_blocking(deleting).await;
-        deleted.map_err(io::Error::other)?
+        tokio::task::spawn_blocking(deleting).await
     }
 }
 
@@ -341,6 +348,26 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_file_that_cannot_be_deleted_leaves_no_other_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
+        let games = [1, 2].map(|id| GameId::from_bytes([id; 16]));
+        let path = |game: GameId, seat| samples::path_of(folder.path(), &game.to_string(), seat);
+        // A folder is no file that could be removed.
+        std::fs::create_dir_all(path(games[0], 0)).expect("created");
+        for path in [path(games[0], 1), path(games[1], 0)] {
+            std::fs::write(path, "").expect("written");
+        }
+        let undeleted = server.delete(games.to_vec()).await.expect("no panic");
+        assert_eq!(Vec::from_iter(undeleted.into_keys()), [games[0]]);
+        assert!(
+            ![path(games[0], 1), path(games[1], 0)]
+                .iter()
+                .any(|path| path.exists())
+        );
+    }
+
+    #[tokio::test]
     async fn streams_keep_their_channels_and_are_bounded() {
         let folder = tempfile::tempdir().expect("a folder");
         let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
@@ -364,7 +391,8 @@ mod tests {
         );
         assert_eq!(add(chunk("stream0", 1, 1)).await.expect("still open"), 1);
         assert_eq!(recorded(folder.path(), game, 0).len(), MAX_STREAMS + 1);
-        server.delete(vec![game]).await.expect("deleted");
+        let undeleted = server.delete(vec![game]).await.expect("no panic");
+        assert!(undeleted.is_empty(), "{undeleted:?}");
         assert!(recorded(folder.path(), game, 0).is_empty());
         let refused = add(chunk("stream0", 1, 1)).await.expect_err("deleted");
         assert!(matches!(refused, SampleError::Deleted));

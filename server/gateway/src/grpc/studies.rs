@@ -523,6 +523,7 @@ fn not_deleted(problem: NotDeleted) -> Status {
             format!("{problem}; wait for them, or set `force` to remove them"),
             [("participants", &active.to_string())],
         ),
+        NotDeleted::Files(_) => internal(),
         NotDeleted::Stopped(_) => shutting_down(),
     }
 }
@@ -541,6 +542,7 @@ fn not_done(problem: NotDone) -> Status {
     match problem {
         NotDone::Study(refusal) => refused(refusal),
         NotDone::Memory(refusal) => Refusal::from(refusal).into(),
+        NotDone::Files => internal(),
         NotDone::Stopped(_) => shutting_down(),
     }
 }

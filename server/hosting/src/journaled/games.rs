@@ -69,7 +69,10 @@ impl<U: Journaled> Unit<U> {
         let Some(stored) = stored else {
             return Ok(None);
         };
-        (background.run(move || read(stored)).await)
-            .ok_or_else(|| StoreError::Failed("reading a record failed".into()))
+        let found = background.run(move || read(stored)).await;
+        Ok(found.unwrap_or_else(|| {
+            error!(of = %U::KIND, id = %self.id(), %game, "reading a record failed; the game counts as broken off");
+            Some(unreadable)
+        }))
     }
 }

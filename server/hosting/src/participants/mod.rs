@@ -9,6 +9,7 @@ mod files;
 mod stored_studies;
 
 use std::collections::BTreeSet;
+use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -92,8 +93,12 @@ impl Participants {
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {
                     // It needs no memory, and refuses only unknown participants, who have no data.
-                    if let Err(NotDone::Stopped(_)) = study.withdraw(number, true).await {
-                        return Err(DataError::ShuttingDown);
+                    match study.withdraw(number, true).await {
+                        Err(NotDone::Stopped(_)) => return Err(DataError::ShuttingDown),
+                        Err(problem @ NotDone::Files) => {
+                            return Err(io::Error::other(problem).into());
+                        }
+                        _ => {}
                     }
                 }
                 None => elsewhere.delete_participant(id, number).await?,

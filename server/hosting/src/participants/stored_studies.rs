@@ -1,6 +1,7 @@
 //! A participant's data in stored studies. Deleting them while no server runs does what its
 //! withdrawal does while one runs.
 
+use std::io;
 use std::sync::Arc;
 
 use chefshat_record::pseudonym::Named;
@@ -40,7 +41,7 @@ impl ParticipantData {
         let mut count = 0;
         for (stored, number) in self.in_studies(who).await? {
             let mut changes = stored.changes;
-            let games = games_of(&changes, number);
+            let mut games = games_of(&changes, number);
             changes.push(Change::Withdrew {
                 number,
                 delete_data: true,
@@ -54,8 +55,14 @@ impl ParticipantData {
             let forgotten = vec![number];
             StoredStudy::rewrite(self.store.as_ref(), id, &changes, forgotten).await?;
             let samples = Arc::new(Samples::new(self.data_dir.clone()));
-            samples.delete(games.clone()).await?;
+            let undeleted = samples.delete(games.clone()).await;
+            let undeleted = undeleted.map_err(io::Error::other)?;
+            games.retain(|game| !undeleted.contains_key(game));
             self.store.delete(games).await?;
+            // Doing it again completes it.
+            if let Some(error) = undeleted.into_values().next() {
+                return Err(error.into());
+            }
             count += 1;
         }
         Ok(count)

@@ -29,7 +29,7 @@ use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::{GameId, RoomId, SeriesId, TournamentId, UnitId, normal_code};
 use chefshat_room::journal::{GameHeader, TournamentGame};
-use chefshat_store::samples::Samples;
+use chefshat_store::samples::{Samples, Undeleted};
 use chefshat_store::{Store, StoreError};
 pub use creation::{Created, NewRoom, PartOf, Seating};
 pub use table::CreateError;
@@ -157,27 +157,33 @@ impl Rooms {
         self.context.may_store(key, bytes)
     }
 
-    /// Deletes finished games from the store, with the samples of their seats.
+    /// Deletes finished games from the store, with the samples of their seats. Those whose samples the
+    /// file system keeps stay, and are returned: doing it again completes it.
     ///
     /// # Errors
-    /// The store or the file system failed; doing it again completes it.
-    pub async fn delete_games(&self, games: Vec<GameId>) -> Result<(), StoreError> {
-        self.delete_samples(&games).await?;
-        self.context.store.delete(games).await
+    /// The store failed; doing it again completes it.
+    pub async fn delete_games(&self, mut games: Vec<GameId>) -> Result<Undeleted, StoreError> {
+        let undeleted = self.delete_samples(&games).await?;
+        games.retain(|game| !undeleted.contains_key(game));
+        self.context.store.delete(games).await?;
+        Ok(undeleted)
     }
 
     /// Deletes those of these finished games that no tournament or study needs, and then the samples
-    /// of their seats. Returns them.
+    /// of their seats. Returns them, and those of which the file system keeps some.
     ///
     /// # Errors
-    /// The store or the file system failed; doing it again completes it.
-    pub async fn prune_games(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+    /// The store failed; doing it again completes it.
+    pub async fn prune_games(
+        &self,
+        games: Vec<GameId>,
+    ) -> Result<(Vec<GameId>, Undeleted), StoreError> {
         let deleted = self.context.store.prune(games).await?;
-        self.delete_samples(&deleted).await?;
-        Ok(deleted)
+        let undeleted = self.delete_samples(&deleted).await?;
+        Ok((deleted, undeleted))
     }
 
-    async fn delete_samples(&self, games: &[GameId]) -> Result<(), StoreError> {
+    async fn delete_samples(&self, games: &[GameId]) -> Result<Undeleted, StoreError> {
         let deleting = self.samples.delete(games.to_vec()).await;
         deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))
     }

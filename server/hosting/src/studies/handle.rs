@@ -1,6 +1,6 @@
 //! The handle of one study: what others can read of it, and messages to its task.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::slice;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard};
@@ -14,7 +14,7 @@ use chefshat_study::{
 use tokio::sync::watch;
 
 use super::data::StudyData;
-use super::message::{Command, Message};
+use super::message::{Command, Message, NotDeleted};
 use super::task::StudyTask;
 use crate::journaled::{Handle, Stopped};
 use crate::rooms::Rooms;
@@ -61,17 +61,9 @@ pub enum NotDone {
     /// The server has no memory for it.
     #[error(transparent)]
     Memory(#[from] Refused),
-    /// It has stopped.
-    #[error(transparent)]
-    Stopped(#[from] Stopped),
-}
-
-/// Why a study is not deleted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NotDeleted {
-    /// This number of participants is in the middle of it.
-    #[error("{0} participants are in the middle of the study")]
-    Running(usize),
+    /// The file system keeps samples of the participant, which are to be deleted.
+    #[error("samples of the participant cannot be deleted yet")]
+    Files,
     /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -434,7 +426,10 @@ impl StudyHandle {
             return Ok(());
         }
         let mut changes = self.changes();
-        while delete_data && self.lock_deleting().contains(&number) {
+        while delete_data && let Some(failed) = self.deletion_failed(number) {
+            if failed {
+                return Err(NotDone::Files);
+            }
             tokio::select! {
                 changed = changes.changed() => changed.map_err(|_| Stopped)?,
                 () = self.stopped() => return Err(Stopped.into()),
@@ -482,8 +477,7 @@ impl StudyHandle {
     /// # Errors
     /// See [`NotDeleted`].
     pub(super) async fn delete(&self, force: bool) -> Result<usize, NotDeleted> {
-        let deleted = self.ask(|reply| Message::Delete { force, reply }).await?;
-        deleted.map_err(NotDeleted::Running)
+        self.ask(|reply| Message::Delete { force, reply }).await?
     }
 
     /// Records interface traces of a participant's game.
@@ -587,7 +581,13 @@ impl StudyHandle {
         }
     }
 
-    pub(super) fn lock_deleting(&self) -> MutexGuard<'_, BTreeSet<u32>> {
+    /// Whether the file system has refused to delete a participant's data; `None` if they are not being
+    /// deleted.
+    fn deletion_failed(&self, number: u32) -> Option<bool> {
+        self.lock_deleting().get(&number).copied()
+    }
+
+    pub(super) fn lock_deleting(&self) -> MutexGuard<'_, BTreeMap<u32, bool>> {
         (self.shared.deleting.lock()).expect("no code that holds this lock can panic")
     }
 

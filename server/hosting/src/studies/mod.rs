@@ -20,9 +20,8 @@ use chefshat_study::{SettingsProblem, Study};
 use tokio_util::task::TaskTracker;
 
 pub use export::{ExportError, ExportedFile};
-pub use handle::{
-    MAX_TRACES, MAX_TRACES_OF_GAME, NotDeleted, NotDone, Presence, StudyHandle, TraceRefusal,
-};
+pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, NotDone, Presence, StudyHandle, TraceRefusal};
+pub use message::NotDeleted;
 
 use crate::config::{MAX_STUDY_DATA, MAX_STUDY_MEMORY};
 use crate::journaled::{self, Folded, Journaled as _, New, Registry, Stopped, owner_of};

@@ -1,6 +1,6 @@
 //! What is shared besides the state of a study: by its readers, and by all studies of a server.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
@@ -30,8 +30,8 @@ pub struct StudyShared {
     pub(super) data: Arc<StudyData>,
     /// Counts the changes of each participant to whom somebody has listened.
     pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
-    /// Participants whose data are being deleted.
-    pub(super) deleting: Mutex<BTreeSet<u32>>,
+    /// Participants whose data are being deleted, and whether the file system has refused it.
+    pub(super) deleting: Mutex<BTreeMap<u32, bool>>,
     /// Number of interface traces by participant and game, since the server was started. Locked while
     /// traces are added or deleted.
     pub(super) traces: Arc<AsyncMutex<BTreeMap<(u32, GameId), usize>>>,

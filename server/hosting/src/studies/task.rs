@@ -7,10 +7,10 @@ use std::time::Duration;
 use chefshat_study::{Change, Refusal, SettingsProblem, Status, Study};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
-use tracing::info;
+use tracing::{info, warn};
 
 use super::data::{RETRY_STUDIES, StudyData, memory_of};
-use super::message::{Command, Message};
+use super::message::{Command, Message, NotDeleted};
 use super::state::{Budgets, StudyShared};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
@@ -19,6 +19,7 @@ use chefshat_base::clock::TimeOfDay;
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, GameId, RoomId, SecretHash, StudyId};
 use chefshat_store::StoreError;
+use chefshat_store::samples::Undeleted;
 use chefshat_store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
 use chefshat_store::units::{StoredUnit, UnitKey, UnitWrite};
 use chefshat_wire::convert::{self, StudyPlan};
@@ -39,6 +40,9 @@ impl UnitHeader for StudyHeader {
     }
 }
 
+/// Time after which data are deleted again that the file system kept.
+pub(super) const DELETION_RETRY: Duration = Duration::from_secs(300);
+
 /// Runs a study.
 pub struct StudyTask {
     pub(super) unit: Unit<Self>,
@@ -58,7 +62,9 @@ pub struct StudyTask {
     /// Rooms that were asked to give up the seat of a participant.
     pub(super) retired: BTreeSet<(RoomId, u32)>,
     /// Those who wait for the deletion of the study, once that is requested.
-    deletion: Vec<oneshot::Sender<Result<usize, usize>>>,
+    deletion: Vec<oneshot::Sender<Result<usize, NotDeleted>>>,
+    /// When data are deleted again that the file system kept.
+    delete_again: Option<Instant>,
 }
 
 impl Journaled for StudyTask {
@@ -132,7 +138,7 @@ impl Journaled for StudyTask {
         let playing = playing.map(|(number, _)| *number).collect();
         // A server that ended in the middle of a deletion completes it.
         let deleted = participants.iter().filter(|(_, it)| it.data_deleted);
-        *unit.handle.lock_deleting() = deleted.map(|(number, _)| *number).collect();
+        *unit.handle.lock_deleting() = deleted.map(|(number, _)| (*number, false)).collect();
         Self {
             unit,
             now: common.now,
@@ -144,6 +150,7 @@ impl Journaled for StudyTask {
             closing: BTreeSet::new(),
             retired: BTreeSet::new(),
             deletion: Vec::new(),
+            delete_again: None,
         }
     }
 
@@ -167,7 +174,7 @@ impl Journaled for StudyTask {
                 let middle = middle.count();
                 if middle > 0 && !force {
                     // The caller may have gone.
-                    let _ = reply.send(Err(middle));
+                    let _ = reply.send(Err(NotDeleted::Running(middle)));
                     return Ok(());
                 }
                 let active = participants.iter();
@@ -242,11 +249,12 @@ impl Journaled for StudyTask {
     /// Deletes the data of participants who want it, once their games are over: of all of them
     /// together, because each time the whole journal is read and written.
     async fn delete(&mut self) -> Result<(), StoreError> {
-        let mut due = self.unit.handle.lock_deleting().clone();
+        let mut due: BTreeSet<u32> = self.unit.handle.lock_deleting().keys().copied().collect();
         due.retain(|number| !self.playing.contains(number));
-        if due.is_empty() {
+        if due.is_empty() || self.delete_again.is_some_and(|at| at > Instant::now()) {
             return Ok(());
         }
+        self.delete_again = None;
         let handle = Arc::clone(&self.unit.handle);
         let mut counts = handle.shared.traces.lock().await;
         let store = self.unit.rooms.store();
@@ -280,14 +288,27 @@ impl Journaled for StudyTask {
             self.unit.rooms.forget(convert::room_of(&game.placed));
         }
         let count = ids.len();
-        self.unit
-            .rooms
-            .delete_games(ids.into_iter().collect())
-            .await?;
+        let ids = ids.into_iter().collect();
+        let undeleted = self.unit.rooms.delete_games(ids).await?;
         for number in &due {
             handle.shared.data.forget_answers(*number);
         }
-        handle.lock_deleting().retain(|it| !due.contains(it));
+        if !undeleted.is_empty() {
+            warn_of(handle.id(), &undeleted);
+            self.delete_again = Some(Instant::now() + DELETION_RETRY);
+        }
+        let failed = |number: u32| {
+            let participant = self.unit.state.participant(number);
+            let mut games = participant.iter().flat_map(|it| &it.games);
+            games.any(|game| undeleted.contains_key(&convert::game_of(&game.placed)))
+        };
+        handle.lock_deleting().retain(|number, has_failed| {
+            if !due.contains(number) {
+                return true;
+            }
+            *has_failed = failed(*number);
+            *has_failed
+        });
         if is_changed {
             info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
         }
@@ -314,7 +335,15 @@ impl Journaled for StudyTask {
         let games = games.into_keys().collect();
         let store = self.unit.rooms.store();
         // The games first: a repetition completes what was interrupted in between.
-        self.unit.rooms.delete_games(games).await?;
+        let undeleted = self.unit.rooms.delete_games(games).await?;
+        if !undeleted.is_empty() {
+            warn_of(self.unit.handle.id(), &undeleted);
+            for reply in self.deletion.drain(..) {
+                // The caller may have gone.
+                let _ = reply.send(Err(NotDeleted::Files(undeleted.len())));
+            }
+            return Ok(false);
+        }
         let unit = UnitKey::Study(self.unit.handle.id());
         store.write_unit(unit, UnitWrite::Delete).await?;
         info!(study = %self.unit.handle.id(), games = count, "a study was deleted");
@@ -337,7 +366,8 @@ impl Journaled for StudyTask {
         let by_core = self.unit.state.wake_in((self.now)(), self.elapsed_ms());
         let by_core = by_core.map(|wait_ms| Instant::now() + Duration::from_millis(wait_ms));
         let by_rooms = self.unit.retry.at();
-        by_core.into_iter().chain(by_rooms).min()
+        let by_files = self.delete_again;
+        by_core.into_iter().chain(by_rooms).chain(by_files).min()
     }
 }
 
@@ -408,7 +438,7 @@ impl StudyTask {
                 delete_data: true,
                 ..
             } => {
-                self.unit.handle.lock_deleting().insert(*number);
+                self.unit.handle.lock_deleting().insert(*number, false);
             }
             _ => {}
         }
@@ -418,6 +448,12 @@ impl StudyTask {
     pub(super) fn is_active(&self, number: u32) -> bool {
         let participant = self.unit.state.participant(number);
         participant.is_some_and(|it| it.status == Status::Active)
+    }
+}
+
+fn warn_of(study: StudyId, undeleted: &Undeleted) {
+    for (game, error) in undeleted {
+        warn!(%study, %game, %error, "samples of a game that is to be deleted were not deleted");
     }
 }
 

@@ -13,7 +13,9 @@ use tokio::time::advance;
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
 use crate::journaled::ROOMS_AT_ONCE;
+use crate::studies::task::DELETION_RETRY;
 use chefshat_base::tasks::{LongTask, polls};
+use chefshat_record::samples;
 use chefshat_room::ids::{GameId, RoomId};
 use chefshat_room::journal::GameHeader;
 use chefshat_room::policy::Durability;
@@ -320,6 +322,35 @@ async fn a_study_that_runs_is_not_resumed_beside_itself() {
     assert!(lab.studies.resume(id, stored).await);
     let found = lab.studies.get(id).expect("it runs");
     assert!(Arc::ptr_eq(&found, &lab.study));
+}
+
+#[tokio::test(start_paused = true)]
+async fn samples_that_cannot_be_deleted_stop_no_study_and_are_tried_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    let lab = Lab::of(&config).await;
+    let _present = lab.begin().await;
+    let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
+    let game = convert::game_of(&game).to_string();
+    // A folder is no file that could be removed.
+    let stuck = samples::path_of(folder.path(), &game, 0);
+    std::fs::create_dir_all(&stuck).expect("created");
+
+    let withdraw = || lab.study.withdraw(1, true);
+    assert_eq!(withdraw().await, Err(NotDone::Files));
+    assert_eq!(lab.open(2).await, Ok(1), "the others go on");
+    let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
+    assert_eq!(delete().await, Err(NotDeleted::Files(1)));
+
+    std::fs::remove_dir(&stuck).expect("removed");
+    assert_eq!(withdraw().await, Err(NotDone::Files));
+    tokio::time::sleep(DELETION_RETRY).await;
+    lab.settled().await;
+    assert_eq!(withdraw().await, Ok(()));
+    assert_eq!(delete().await, Ok((2, 1)));
 }
 
 #[tokio::test(start_paused = true)]
