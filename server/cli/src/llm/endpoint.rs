@@ -256,7 +256,9 @@ impl Endpoint {
             attempts += 1;
             match self.complete(&question, FIRST_ANSWER).await {
                 Ok(_) => return Ok(()),
-                Err((EndpointError::Passing { pause, .. }, _)) if attempts < FIRST_ATTEMPTS => {
+                Err((EndpointError::Passing { pause, .. }, _))
+                    if attempts < FIRST_ATTEMPTS && pause <= FIRST_ANSWER =>
+                {
                     tokio::time::sleep(pause).await;
                 }
                 Err((error, _)) => {
