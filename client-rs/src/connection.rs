@@ -31,7 +31,7 @@ const STREAM_WINDOW_BYTES: u32 = 1 << 20;
 /// The same limit for all streams of a connection together.
 const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
 /// Maximum size of a response: enough for the history of hundreds of seats in one message.
-pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;
+pub const MAX_RESPONSE_BYTES: usize = 64 << 20;
 /// Name of the header that shows an owner token or a ticket.
 const SECRET_HEADER: &str = "chefshat-secret";
 /// First line of each certificate in a PEM file.

@@ -33,7 +33,7 @@ pub use backoff::{Backoff, FIRST_DELAY, GIVE_UP_AFTER, MAX_DELAY};
 pub use chefshat_proto::v1;
 pub use client::Client;
 pub use clock::ServerClock;
-pub use connection::{ConnectOptions, Connection};
+pub use connection::{ConnectOptions, Connection, MAX_RESPONSE_BYTES};
 pub use error::{Error, PlayError};
 pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal};
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};

@@ -10631,7 +10631,7 @@ pub mod study_service_client {
         /// Streams the study and its participants, then every change, at most about four times a second,
         /// until the study is closed and nobody but test participants is active; in between heartbeats.
         /// NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-        /// client does not read a message within 30 seconds).
+        /// client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn follow_study(
             &mut self,
             request: impl tonic::IntoRequest<super::FollowStudyRequest>,
@@ -10718,8 +10718,9 @@ pub mod study_service_client {
         /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-        /// `codebook.csv` for people and `datapackage.json` for programs.
-        /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+        /// incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+        /// read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         pub async fn export_study(
             &mut self,
             request: impl tonic::IntoRequest<super::ExportStudyRequest>,
@@ -10875,7 +10876,7 @@ pub mod study_service_server {
         /// Streams the study and its participants, then every change, at most about four times a second,
         /// until the study is closed and nobody but test participants is active; in between heartbeats.
         /// NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-        /// client does not read a message within 30 seconds).
+        /// client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
         fn follow_study(
             &self,
             request: tonic::Request<super::FollowStudyRequest>,
@@ -10915,8 +10916,9 @@ pub mod study_service_server {
         /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-        /// `codebook.csv` for people and `datapackage.json` for programs.
-        /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+        /// incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+        /// read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         fn export_study(
             &self,
             request: tonic::Request<super::ExportStudyRequest>,

@@ -536,6 +536,14 @@ test("a study that cannot be deleted stays, and says why", async () => {
   expect(ownerTokenOf(ID)).toBe(TOKEN);
 });
 
+test("an export that the server ended early is none", async () => {
+  keepOwnerToken(ID, TOKEN);
+  vi.spyOn(studyApi, "exportStudy").mockImplementation(async function* () {
+    yield create(ExportStudyResponseSchema, { file: "participants.csv", data: new Uint8Array(3) });
+  });
+  await expect(exportStudy(ID, false, () => {})).rejects.toThrow("before it was complete");
+});
+
 test("the data are one ZIP with the files of the server", async () => {
   keepOwnerToken(ID, TOKEN);
   vi.spyOn(studyApi, "exportStudy").mockImplementation(async function* () {
@@ -544,10 +552,11 @@ test("the data are one ZIP with the files of the server", async () => {
     yield part("participants.csv", "1234");
     yield part("participants.csv", "56789");
     yield part("records/ä.jsonl", "{}");
+    yield part("datapackage.json", "{}");
   });
   const counted: number[] = [];
   const files = await exportStudy(ID, false, (count) => counted.push(count));
-  expect(counted).toEqual([1, 2]);
+  expect(counted).toEqual([1, 2, 3]);
   const bytes = new Uint8Array(await zipped(files).arrayBuffer());
   const view = new DataView(bytes.buffer);
   expect(view.getUint32(0, true)).toBe(0x04034b50);
@@ -556,7 +565,7 @@ test("the data are one ZIP with the files of the server", async () => {
   expect([view.getUint32(18, true), view.getUint16(26, true)]).toEqual([9, "participants.csv".length]);
   const end = bytes.length - 22;
   expect(view.getUint32(end, true)).toBe(0x06054b50);
-  expect(view.getUint16(end + 10, true)).toBe(2);
+  expect(view.getUint16(end + 10, true)).toBe(3);
   const central = view.getUint32(end + 16, true);
   expect(view.getUint32(central, true)).toBe(0x02014b50);
   // The second entry points to its local header.

@@ -1,6 +1,7 @@
 // Studies of researchers: the owner tokens that this device stores, and calls with them.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { CALL_LIMIT_MS } from "../api/client";
 import type { Study, StudyLink, StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { pathOf } from "../router";
@@ -90,6 +91,9 @@ export async function deleteStudy(studyId: string, force: boolean): Promise<void
   remember(STORED + studyId, null);
 }
 
+/** Without it an export is incomplete. */
+const LAST_FILE = "datapackage.json";
+
 /**
  * The data of a study, or those of its test participants, as files in the order of the server; `onFiles`
  * is called with their number.
@@ -108,6 +112,7 @@ export async function exportStudy(
       onFiles(files.size);
     }
   }
+  if (!files.has(LAST_FILE)) throw new ConnectError("the export ended before it was complete", Code.Unavailable);
   return files;
 }
 

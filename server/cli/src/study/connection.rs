@@ -1,6 +1,6 @@
 //! The connection of the commands to the server's studies.
 
-use chefshat_client::{Connection, Error};
+use chefshat_client::{Connection, Error, MAX_RESPONSE_BYTES};
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
 
 use crate::CommandError;
@@ -10,7 +10,8 @@ use crate::connect::ServerArg;
 pub(super) async fn service(
     server: &ServerArg,
 ) -> Result<StudyServiceClient<Connection>, CommandError> {
-    Ok(StudyServiceClient::new(server.connect().await?.channel()))
+    let service = StudyServiceClient::new(server.connect().await?.channel());
+    Ok(service.max_decoding_message_size(MAX_RESPONSE_BYTES))
 }
 
 /// A refusal, for people.

@@ -4,16 +4,23 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use chefshat_proto::v1;
 use chrono::{DateTime, SecondsFormat};
 use clap::Args;
 use serde_json::json;
+use tonic::{Code, Status};
 
 use super::connection::{refused, service};
-use crate::connect::{OwnerArgs, ServerArg};
+use crate::connect::{OwnerArgs, PATIENCE, ServerArg};
 use crate::numbers::counted;
 use crate::{CommandError, say};
+
+/// The file that is exported last: without it an export is incomplete.
+const LAST_FILE: &str = "datapackage.json";
+/// Pause before a study is followed again.
+const FOLLOW_AGAIN: Duration = Duration::from_secs(1);
 
 /// A study and the proof of ownership.
 #[derive(Debug, Args)]
@@ -229,16 +236,42 @@ impl Links {
 
 impl Follow {
     pub(super) async fn run(self) -> Result<(), CommandError> {
-        let owned = self.owned;
-        let mut service = service(&owned.server).await?;
+        let mut shown = Shown::default();
+        let mut reached = Instant::now();
+        while let Err(status) = self.follow(&mut shown, &mut reached).await? {
+            // It stops or moves to another node, where the study goes on.
+            if status.code() != Code::Unavailable || reached.elapsed() >= PATIENCE {
+                return Err(refused(status));
+            }
+            tokio::time::sleep(FOLLOW_AGAIN).await;
+        }
+        Ok(())
+    }
+
+    /// Shows changes until the study is over, or the connection is lost. `reached` is when the server
+    /// sent the last one.
+    async fn follow(
+        &self,
+        shown: &mut Shown,
+        reached: &mut Instant,
+    ) -> Result<Result<(), Status>, CommandError> {
+        let mut service = service(&self.owned.server).await?;
         let request = v1::FollowStudyRequest {
-            study_id: owned.study_id.clone(),
-            owner_token: owned.owner.token()?,
+            study_id: self.owned.study_id.clone(),
+            owner_token: self.owned.owner.token()?,
         };
-        let followed = service.follow_study(request).await.map_err(refused)?;
-        let mut updates = followed.into_inner();
-        while let Some(update) = updates.message().await.map_err(refused)? {
-            if owned.json {
+        let mut updates = match service.follow_study(request).await {
+            Ok(followed) => followed.into_inner(),
+            Err(status) => return Ok(Err(status)),
+        };
+        loop {
+            let update = match updates.message().await {
+                Ok(Some(update)) => shown.new_in(update),
+                Ok(None) => return Ok(Ok(())),
+                Err(status) => return Ok(Err(status)),
+            };
+            *reached = Instant::now();
+            if self.owned.json {
                 if update != v1::FollowStudyResponse::default() {
                     say(json!(update))?;
                 }
@@ -252,7 +285,31 @@ impl Follow {
                 .iter()
                 .try_for_each(|it| say(line(it)))?;
         }
-        Ok(())
+    }
+}
+
+/// What was shown of a study: a stream that is opened again begins with all of it.
+#[derive(Default)]
+struct Shown {
+    study: Option<v1::Study>,
+    participants: BTreeMap<u32, v1::StudyParticipant>,
+}
+
+impl Shown {
+    /// What of an update was not shown yet.
+    fn new_in(&mut self, update: v1::FollowStudyResponse) -> v1::FollowStudyResponse {
+        let study = update
+            .study
+            .filter(|study| self.study.replace(study.clone()).as_ref() != Some(study));
+        let mut participants = update.participants;
+        participants.retain(|it| {
+            let before = self.participants.insert(it.number, it.clone());
+            before.as_ref() != Some(it)
+        });
+        v1::FollowStudyResponse {
+            study,
+            participants,
+        }
     }
 }
 
@@ -281,6 +338,12 @@ impl Export {
             let (_, file) = open.insert((part.file.clone(), file));
             file.write_all(&part.data)?;
             *sizes.entry(part.file).or_default() += part.data.len() as u64;
+        }
+        if !sizes.contains_key(LAST_FILE) {
+            return Err(format!(
+                "the server ended the export before it was complete; delete {out} and export again"
+            )
+            .into());
         }
         let (records, files): (Vec<_>, Vec<_>) = sizes
             .iter()

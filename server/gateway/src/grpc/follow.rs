@@ -6,6 +6,7 @@ use std::sync::Arc;
 use chefshat_proto::v1::{FollowTournamentResponse, TournamentState};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::time::{Instant, sleep_until};
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status};
 
 use super::status::{self, status};
@@ -43,9 +44,25 @@ pub(super) async fn follow(
     }
 }
 
+/// Runs what sends a stream, until it ends or the server closes its streams, and tells the client why
+/// it ends. What `sending` holds, such as a place among the followers, is given back before: the client
+/// may not read.
+pub(super) async fn run<M>(
+    closing: CancellationToken,
+    sender: mpsc::Sender<Result<M, Status>>,
+    sending: impl Future<Output = Result<(), Status>>,
+) {
+    let sent = closing.run_until_cancelled(sending).await;
+    end(
+        &sender,
+        sent.unwrap_or_else(|| Err(status::shutting_down())),
+    )
+    .await;
+}
+
 /// Ends a stream, with the reason if there is one. Waits until the client receives it or has gone.
-pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, followed: Result<(), Status>) {
-    if let Err(status) = followed {
+pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, sent: Result<(), Status>) {
+    if let Err(status) = sent {
         // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
     }
@@ -109,6 +126,7 @@ mod tests {
     use std::pin::pin;
 
     use futures::FutureExt as _;
+    use tokio::sync::oneshot::error::TryRecvError;
     use tonic_types::StatusExt as _;
 
     use crate::grpc::follow::*;
@@ -124,6 +142,38 @@ mod tests {
         assert_eq!(info.reason, "FOLLOWER_TOO_SLOW");
         let first = receiver.recv().await.expect("a message");
         assert_eq!(first.expect("no error"), 1);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_client_that_does_not_read_holds_nothing_and_learns_why_its_stream_ends() {
+        let (closing, (sender, mut receiver)) = (CancellationToken::new(), mpsc::channel(1));
+        let (place, mut free) = tokio::sync::oneshot::channel::<()>();
+        let sending = {
+            let sender = sender.clone();
+            async move {
+                let _place = place;
+                send(&sender, 1).await?;
+                pending().await
+            }
+        };
+        let running = tokio::spawn(run(closing.clone(), sender, sending));
+        tokio::task::yield_now().await;
+        assert!(
+            free.try_recv()
+                .is_err_and(|error| error == TryRecvError::Empty)
+        );
+        closing.cancel();
+        free.await.expect_err("it is given back");
+        assert_eq!(
+            receiver.recv().await.expect("a message").expect("no error"),
+            1
+        );
+        let ended = receiver.recv().await.expect("the reason");
+        assert_eq!(
+            ended.expect_err("it is incomplete").code(),
+            Code::Unavailable
+        );
+        running.await.expect("no panic");
     }
 
     #[tokio::test(start_paused = true)]

@@ -20,6 +20,7 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::follow::end;
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lookup::RecordView;
@@ -28,7 +29,7 @@ use super::pages;
 use super::recorded::{Recorded, SERIES_OPEN};
 use super::status::{
     OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason,
-    read_failed, status,
+    read_failed, reader_too_slow, status,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
@@ -584,26 +585,8 @@ async fn send<T>(
 
 async fn send_part<T>(sender: &mpsc::Sender<Result<T, Status>>, part: T) -> Result<(), Status> {
     let sent = sender.send_timeout(Ok(part), RECORD_SEND_TIMEOUT);
-    sent.await.map_err(|_| reader_too_slow())
-}
-
-/// Tells the client why the stream ends. Waits, without anything large in memory, until the status
-/// is received or the client has gone.
-async fn end<T>(sender: &mpsc::Sender<Result<T, Status>>, sent: Result<(), Status>) {
-    if let Err(status) = sent {
-        // It fails only if the client has gone.
-        let _ = sender.send(Err(status)).await;
-    }
-}
-
-fn reader_too_slow() -> Status {
-    let seconds = RECORD_SEND_TIMEOUT.as_secs();
-    status(
-        Code::ResourceExhausted,
-        "READER_TOO_SLOW",
-        format!("a part of a record was not received within {seconds} s; request it again"),
-        [],
-    )
+    sent.await
+        .map_err(|_| reader_too_slow("a record", RECORD_SEND_TIMEOUT))
 }
 
 /// The next lines that fit one message.

@@ -4,6 +4,7 @@
 
 use std::collections::HashMap;
 use std::convert::Infallible;
+use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -253,6 +254,17 @@ pub fn internal() -> Status {
         Code::Internal,
         "INTERNAL",
         "the server failed to do this; see its log",
+        [],
+    )
+}
+
+/// The status for a client that has not received a part of `what` within `limit`.
+pub(super) fn reader_too_slow(what: &str, limit: Duration) -> Status {
+    let seconds = limit.as_secs();
+    status(
+        Code::ResourceExhausted,
+        "READER_TOO_SLOW",
+        format!("a part of {what} was not received within {seconds} s; request it again"),
         [],
     )
 }

@@ -21,13 +21,14 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::follow::{self, end, send};
+use super::follow::{self, send};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists;
 use super::lookup::Lookup;
 use super::status::{
-    Refusal, field, internal, not_created, read_failed, request_id, shutting_down, status,
+    Refusal, field, internal, not_created, read_failed, reader_too_slow, request_id, shutting_down,
+    status,
 };
 use chefshat_admission::access::{Caller, Role};
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
@@ -46,8 +47,8 @@ use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
 
-/// Participants of a study that a follower costs its caller as much as one call.
-const FOLLOWED_PER_CALL: usize = 100;
+/// Participants of a study about all of whom a request costs its caller one call more.
+const PARTICIPANTS_PER_CALL: usize = 100;
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
@@ -84,6 +85,27 @@ impl StudyCalls {
             participants: FairSemaphore::new(MAX_STUDY_STREAMS, shares),
             closing,
         }
+    }
+
+    /// Charges a caller for something about all participants of a study.
+    fn charge_all(&self, handle: &StudyHandle, key: Key) {
+        let participants = handle.read(|study| study.participants().len());
+        self.calls
+            .charge(key, (participants / PARTICIPANTS_PER_CALL) as u64);
+    }
+
+    /// Answers with something about all participants of a study, in turn among long computations.
+    async fn about_all<T: Send + 'static>(
+        &self,
+        handle: Arc<StudyHandle>,
+        key: Key,
+        compute: impl FnOnce(&StudyHandle) -> T + Send + 'static,
+    ) -> Result<Response<T>, Status> {
+        self.charge_all(&handle, key);
+        let background = self.studies.rooms().background();
+        let _slice = background.slice(key).await;
+        let computed = background.run(move || compute(&handle)).await;
+        computed.map(Response::new).ok_or_else(internal)
     }
 
     /// The study with this id, if this node has it. If another node does, the error sends the request
@@ -165,14 +187,17 @@ impl StudyService for StudyCalls {
         request: Request<v1::GetStudyRequest>,
     ) -> Result<Response<v1::GetStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
-        Ok(Response::new(v1::GetStudyResponse {
+        let rooms = Arc::clone(self.studies.rooms());
+        let described = move |handle: &StudyHandle| v1::GetStudyResponse {
             study: Some(handle.describe_with_pictures()),
-            participants: handle.participants(self.studies.rooms()),
-        }))
+            participants: handle.participants(&rooms),
+        };
+        self.about_all(handle, key, described).await
     }
 
     async fn list_studies(
@@ -253,20 +278,24 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::ListStudyLinksResponse>, Status> {
         use chefshat_study::Status::{Active, DroppedOut, Invited};
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
-        let numbers: Vec<u32> = handle.read(|study| {
-            let participants = study.participants().iter();
-            participants
-                .filter(|(_, it)| matches!(it.status, Invited | Active | DroppedOut))
-                .map(|(number, _)| *number)
-                .collect()
-        });
-        Ok(Response::new(v1::ListStudyLinksResponse {
-            links: numbers.into_iter().map(|it| handle.link(it)).collect(),
-        }))
+        let links = |handle: &StudyHandle| {
+            let numbers: Vec<u32> = handle.read(|study| {
+                let participants = study.participants().iter();
+                participants
+                    .filter(|(_, it)| matches!(it.status, Invited | Active | DroppedOut))
+                    .map(|(number, _)| *number)
+                    .collect()
+            });
+            v1::ListStudyLinksResponse {
+                links: numbers.into_iter().map(|it| handle.link(it)).collect(),
+            }
+        };
+        self.about_all(handle, key, links).await
     }
 
     async fn follow_study(
@@ -287,18 +316,16 @@ impl StudyService for StudyCalls {
                 retry_after: FOLLOW_SEND_TIMEOUT,
             })
         })?;
-        let participants = handle.read(|study| study.participants().len());
-        self.calls
-            .charge(key, (participants / FOLLOWED_PER_CALL) as u64);
+        self.charge_all(&handle, key);
         let (sender, responses) = mpsc::channel(1);
         let studies = Arc::clone(&self.studies);
         let counted = studies.rooms().metrics().stream(StreamKind::Follow);
+        let to = sender.clone();
         let following = async move {
-            let (_place, _counted) = (place, counted);
-            end(&sender, follow(&handle, &studies, key, &sender).await).await;
+            let _held = (place, counted);
+            follow(&handle, &studies, key, &to).await
         };
-        let closing = self.closing.clone();
-        let following = closing.run_until_cancelled_owned(following);
+        let following = follow::run(self.closing.clone(), sender, following);
         tokio::spawn(named(LongTask::FollowStudy, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
@@ -350,35 +377,35 @@ impl StudyService for StudyCalls {
         let (sender, responses) = mpsc::channel(1);
         let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
         let studies = Arc::clone(&self.studies);
+        let to = sender.clone();
         let exporting = async move {
             let _place = place;
-            let forwarding = async {
+            let forwarding = async move {
                 while let Some(part) = exported.recv().await {
                     let response = v1::ExportStudyResponse {
                         file: part.file,
                         data: part.data,
                     };
-                    let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
-                    if sent.await.is_err() {
-                        // What gathers the export notices it, and gives its place back.
-                        return exported.close();
-                    }
+                    // If it is not received, what gathers the export notices that this has ended.
+                    let sent = to.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
+                    sent.await
+                        .map_err(|_| reader_too_slow("the export", FOLLOW_SEND_TIMEOUT))?;
                 }
+                Ok(())
             };
             let gathering = async move {
                 let gathered = handle.export(studies.rooms(), request.test, &files).await;
                 drop(files);
                 gathered
             };
-            let ((), gathered) = tokio::join!(forwarding, gathering);
-            if let Err(ExportError::Store(error)) = gathered {
-                let _ = sender.send(Err(read_failed(error))).await;
+            match tokio::join!(forwarding, gathering) {
+                (_, Err(ExportError::Store(error))) => Err(read_failed(error)),
+                (forwarded, _) => forwarded,
             }
         };
-        let closing = self.closing.clone();
         tokio::spawn(short(
             "one export",
-            closing.run_until_cancelled_owned(exporting),
+            follow::run(self.closing.clone(), sender, exporting),
         ));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }

@@ -21,7 +21,7 @@ use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
 use super::access::check;
-use super::follow::{compute_failed, end, follow};
+use super::follow::{self, compute_failed, follow};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists::{self, Listing, Page, Part};
@@ -501,16 +501,14 @@ impl TournamentService for TournamentCalls {
             })
         })?;
         let (sender, responses) = mpsc::channel(1);
-        let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
+        let permits = Arc::clone(&self.update_permits);
         let counted = self.recorded.rooms().metrics().stream(StreamKind::Follow);
+        let to = sender.clone();
         let following = async move {
-            let _counted = counted;
-            let followed = follow(&handle, &permits, &sender).await;
-            // A follower that does not read does not block the others.
-            drop(place);
-            end(&sender, followed).await;
+            let _held = (place, counted);
+            follow(&handle, &permits, &to).await
         };
-        let following = closing.run_until_cancelled_owned(following);
+        let following = follow::run(self.closing.clone(), sender, following);
         tokio::spawn(named(LongTask::FollowTournament, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }

@@ -60,7 +60,7 @@ export const faults: Texts["faults"] = {
       "Aus deinem Netz oder mit deinem Link sind zu viele Seiten und Agenten verbunden. Schließe einige davon.",
     TOO_MANY_FOLLOWERS: "Gerade verfolgen zu viele Leute Turniere.",
     TOO_MANY_WRONG_CODES: "Es wurden zu viele falsche Codes eingegeben. Prüfe den Code.",
-    READER_TOO_SLOW: "Deine Verbindung ist zu langsam, um diese Partie zu laden. Versuche es mit einer besseren.",
+    READER_TOO_SLOW: "Deine Verbindung ist zu langsam, um das zu laden. Versuche es mit einer besseren.",
     DISK_NEARLY_FULL:
       "Die Festplatte des Servers ist fast voll: Es kann nichts Neues beginnen. Die Person, die ihn betreibt, muss Platz schaffen. Laufende Partien gehen weiter.",
     STORE_FAILED:

@@ -56,7 +56,7 @@ export const faults = {
       "Too many pages and agents are connected from your network, or with your link. Close some of them.",
     TOO_MANY_FOLLOWERS: "Too many people follow tournaments at the moment.",
     TOO_MANY_WRONG_CODES: "Too many wrong codes were entered. Check the code.",
-    READER_TOO_SLOW: "Your connection is too slow to load this game. Try again with a better one.",
+    READER_TOO_SLOW: "Your connection is too slow to load this. Try again with a better one.",
     DISK_NEARLY_FULL:
       "The server’s disk is nearly full: nothing new can start. Its host has to free some space. Running games continue.",
     STORE_FAILED:

@@ -58,7 +58,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_STREAMS: "Hay demasiadas páginas y agentes conectados desde tu red, o con tu enlace. Cierra algunos.",
     TOO_MANY_FOLLOWERS: "En este momento demasiadas personas siguen torneos.",
     TOO_MANY_WRONG_CODES: "Se han escrito demasiados códigos incorrectos. Comprueba el código.",
-    READER_TOO_SLOW: "Tu conexión es demasiado lenta para cargar esta partida. Inténtalo con una mejor.",
+    READER_TOO_SLOW: "Tu conexión es demasiado lenta para cargar esto. Inténtalo con una mejor.",
     DISK_NEARLY_FULL:
       "El disco del servidor está casi lleno: no puede empezar nada nuevo. Quien lo administra debe liberar espacio. Las partidas en curso continúan.",
     STORE_FAILED:

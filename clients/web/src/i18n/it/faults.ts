@@ -56,7 +56,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_STREAMS: "Troppe pagine e troppi agenti sono collegati dalla tua rete o con il tuo link. Chiudine alcuni.",
     TOO_MANY_FOLLOWERS: "Al momento troppe persone seguono dei tornei.",
     TOO_MANY_WRONG_CODES: "Sono stati inseriti troppi codici sbagliati. Controlla il codice.",
-    READER_TOO_SLOW: "La tua connessione è troppo lenta per caricare questa partita. Riprova con una migliore.",
+    READER_TOO_SLOW: "La tua connessione è troppo lenta per caricare questi dati. Riprova con una migliore.",
     DISK_NEARLY_FULL:
       "Il disco del server è quasi pieno: non può iniziare niente di nuovo. Chi gestisce il server deve liberare spazio. Le partite in corso continuano.",
     STORE_FAILED:

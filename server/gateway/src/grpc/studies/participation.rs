@@ -16,7 +16,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
 use super::{Responses, StudyCalls, code_of, not_done, refused};
-use crate::grpc::follow::{changed, end};
+use crate::grpc::follow::{self, changed};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
 use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key, Refused};
@@ -255,19 +255,18 @@ impl ParticipationService for StudyCalls {
         let (sender, responses) = mpsc::channel(1);
         let rooms = Arc::clone(self.studies.rooms());
         let counted = rooms.metrics().stream(StreamKind::Follow);
+        let to = sender.clone();
         let following = async move {
-            let (_place, _counted) = (place, counted);
+            let _held = (place, counted);
             let _presence = handle.present(number, session).await;
-            let following = follow(&handle, &rooms, number, session, &sender);
+            let following = follow(&handle, &rooms, number, session, &to);
             // A client that goes is absent at once.
-            let followed = tokio::select! {
+            tokio::select! {
                 followed = following => followed,
-                () = sender.closed() => Ok(()),
-            };
-            end(&sender, followed).await;
+                () = to.closed() => Ok(()),
+            }
         };
-        let closing = self.closing.clone();
-        let following = closing.run_until_cancelled_owned(following);
+        let following = follow::run(self.closing.clone(), sender, following);
         tokio::spawn(named(LongTask::Participation, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }

@@ -144,7 +144,7 @@ class StudyServiceServicer(object):
         """Streams the study and its participants, then every change, at most about four times a second,
         until the study is closed and nobody but test participants is active; in between heartbeats.
         NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-        client does not read a message within 30 seconds).
+        client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -175,8 +175,9 @@ class StudyServiceServicer(object):
         `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-        `codebook.csv` for people and `datapackage.json` for programs.
-        NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+        incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+        read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

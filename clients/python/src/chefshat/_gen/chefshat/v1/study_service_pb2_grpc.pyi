@@ -59,7 +59,7 @@ class StudyServiceStub:
     """Streams the study and its participants, then every change, at most about four times a second,
     until the study is closed and nobody but test participants is active; in between heartbeats.
     NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-    client does not read a message within 30 seconds).
+    client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
     """
     RemoveStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
@@ -78,8 +78,9 @@ class StudyServiceStub:
     `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
     `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
     under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-    `codebook.csv` for people and `datapackage.json` for programs.
-    NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+    incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+    read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
@@ -127,7 +128,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """Streams the study and its participants, then every change, at most about four times a second,
     until the study is closed and nobody but test participants is active; in between heartbeats.
     NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-    client does not read a message within 30 seconds).
+    client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
     """
     RemoveStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]  # type: ignore[assignment]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
@@ -146,8 +147,9 @@ class StudyServiceAsyncStub(StudyServiceStub):
     `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
     `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
     under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-    `codebook.csv` for people and `datapackage.json` for programs.
-    NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+    incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+    read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
@@ -228,7 +230,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         """Streams the study and its participants, then every change, at most about four times a second,
         until the study is closed and nobody but test participants is active; in between heartbeats.
         NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
-        client does not read a message within 30 seconds).
+        client does not read a message within 30 seconds); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -265,8 +267,9 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         under `records/` and samples under `samples/`, and last what the columns of the tables mean,
-        `codebook.csv` for people and `datapackage.json` for programs.
-        NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        `codebook.csv` for people and `datapackage.json` for programs. Without this last file the export is
+        incomplete. NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (READER_TOO_SLOW if the client does not
+        read a part within 30 seconds); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
