@@ -28,6 +28,8 @@ Examples:
 
 The same seed gives the same output, on any number of threads.";
 
+/// Most Shifts of a condition: more would take weeks.
+const MOST_SHIFTS: u64 = 1_000_000_000;
 /// Shifts of each condition that `--large` adds.
 const LARGE: u64 = 100_000;
 
@@ -63,7 +65,7 @@ impl ExperimentCommand {
 #[command(after_help = HELP)]
 struct Mechanics {
     /// Shifts of each condition; the paper plays 250.
-    #[arg(long, default_value_t = u64::from(SHIFTS_PER_GAME), value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = u64::from(SHIFTS_PER_GAME), value_parser = clap::value_parser!(u64).range(1..=MOST_SHIFTS))]
     shifts: u64,
     /// Also play 100,000 Shifts of each condition, for narrow intervals.
     #[arg(long)]
@@ -103,10 +105,7 @@ impl Mechanics {
             .chain(self.large.then_some(LARGE))
             .collect();
         let mut rows = self.rows();
-        let shifts = numbers
-            .iter()
-            .sum::<u64>()
-            .saturating_mul(rows.len() as u64);
+        let shifts = numbers.iter().sum::<u64>() * rows.len() as u64;
         let bar = progress::of_items(shifts, "Shifts");
         let pool = threads::pool(self.threads, u64::MAX)?;
         pool.install(|| {
