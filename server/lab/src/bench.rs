@@ -176,16 +176,24 @@ impl TableCommand {
                 }
             }
         }
-        if let (true, Some(error)) = (results.is_empty(), left_out) {
-            return Err(error);
-        }
         let mut versus: Vec<TaskResult> = Vec::new();
         for task in tasks() {
-            for result in results.iter().filter(|it| it.task == task.name) {
-                if !versus.iter().any(|it| it.is_comparable(result)) {
-                    versus.push(self.versus(task, result, key.as_ref(), &results)?);
+            while let Some(result) = results.iter().find(|it| {
+                it.task == task.name && !versus.iter().any(|versus| versus.is_comparable(it))
+            }) {
+                match self.versus(task, result, key.as_ref(), &results) {
+                    Ok(compared) => versus.push(compared),
+                    Err(error) => {
+                        anstream::eprintln!("left out: {}: {error}", task.name);
+                        left_out = Some(error);
+                        let result = result.clone();
+                        results.retain(|it| !it.is_comparable(&result));
+                    }
                 }
             }
+        }
+        if let (true, Some(error)) = (results.is_empty(), left_out) {
+            return Err(error);
         }
         report::print_table(&results, &versus, self.json)
     }
@@ -204,8 +212,9 @@ impl TableCommand {
         if let (false, Some(named)) = (is_built_in, results.iter().find(is_named)) {
             return Ok(named.clone());
         }
-        let entrant = Entrant::of(&self.versus)
-            .map_err(|error| format!("--versus: none of the results has this name, and {error}"))?;
+        let entrant = Entrant::of(&self.versus).map_err(|error| {
+            format!("--versus: no result on the same deals has this name, and {error}")
+        })?;
         let hidden = &result.deals_commitment;
         let task = task.with_deals(key.filter(|_| hidden.is_some()));
         if task.deals_commitment() != *hidden {

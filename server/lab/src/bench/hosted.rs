@@ -20,6 +20,7 @@ use tokio::io::AsyncWriteExt as _;
 use tokio::process::ChildStdin;
 use tokio::sync::Mutex;
 use tokio::time::{sleep, timeout};
+use tokio_util::task::task_tracker::{TaskTracker, TaskTrackerToken};
 
 use super::folder::Folder;
 
@@ -40,13 +41,15 @@ const QUIET: Duration = Duration::from_secs(30);
 pub(super) const FAILURES: usize = 5;
 
 /// Plays the games of these deals. Games that fail are named and leave the others alone, unless several
-/// fail in a row.
+/// fail in a row. `closing` closes the rooms of games that do not end; whoever drops the future waits
+/// for it.
 pub(super) async fn play(
     folder: &Folder,
     command: &AgentCommand,
     deals: Vec<usize>,
     parallel: usize,
     server: Option<&str>,
+    closing: &TaskTracker,
 ) -> Result<(), CommandError> {
     if deals.is_empty() {
         return Ok(());
@@ -67,10 +70,14 @@ pub(super) async fn play(
         folder,
         command,
         client: &client,
+        closing,
         // With TLS an agent must see the scheme.
         address: url.trim_start_matches("http://").trim_end_matches('/'),
     };
-    games.play(deals, parallel).await?;
+    let played = games.play(deals, parallel).await;
+    closing.close();
+    closing.wait().await;
+    played?;
     drop(client);
     if let Some(host) = host {
         host.stop().await?;
@@ -78,11 +85,34 @@ pub(super) async fn play(
     Ok(())
 }
 
+/// A room that is closed when this is dropped: it would take a place of the server's for as long as it
+/// waits for the agent.
+struct OpenRoom {
+    client: Client,
+    closing: TaskTracker,
+    /// Whoever waits for `closing` waits for this as well.
+    _token: TaskTrackerToken,
+    /// Its id and its owner token; `None`: its game is over.
+    secrets: Option<(String, String)>,
+}
+
+impl Drop for OpenRoom {
+    fn drop(&mut self) {
+        if let Some((room, owner_token)) = self.secrets.take() {
+            let client = self.client.clone();
+            self.closing.spawn(async move {
+                let _closed = timeout(END, client.close_room(room, owner_token)).await;
+            });
+        }
+    }
+}
+
 /// The games of a run.
 struct Games<'a> {
     folder: &'a Folder,
     command: &'a AgentCommand,
     client: &'a Client,
+    closing: &'a TaskTracker,
     /// `host:port` of the server, or its URL with TLS.
     address: &'a str,
 }
@@ -164,19 +194,27 @@ impl Games<'_> {
         deal: usize,
         reads: Option<&Mutex<ChildStdin>>,
     ) -> Result<(), CommandError> {
-        let created = self.client.create_room(self.folder.task.room(deal)).await?;
-        let room = created.room.unwrap_or_default();
+        let (client, closing) = (self.client.clone(), self.closing.clone());
+        let request = self.folder.task.room(deal);
+        // In a task of its own: if this is dropped meanwhile, the room is closed once it is there.
+        let creating = self.closing.spawn(async move {
+            let created = client.create_room(request).await?;
+            let room = created.room.clone().unwrap_or_default();
+            let secrets = Some((room.room_id.clone(), created.owner_token.clone()));
+            let open = OpenRoom {
+                _token: closing.token(),
+                client,
+                closing,
+                secrets,
+            };
+            Ok::<_, Error>((created, room, open))
+        });
+        let (created, room, mut open) = creating.await??;
         // Games of hidden deals are private.
         let owner = self.client.with_secrets([&created.owner_token])?;
-        let played = self
-            .until_over(&owner, &room, created.join_code, reads)
-            .await;
-        if played.is_err() {
-            // It would take a seat of the server's for as long as it waits for the agent.
-            let closing = self.client.close_room(room.room_id, created.owner_token);
-            let _closed = timeout(END, closing).await;
-        }
-        played?;
+        self.until_over(&owner, &room, created.join_code, reads)
+            .await?;
+        open.secrets = None;
         let lines = record(&owner, &room.game_id).await?;
         let text = jsonl::text(&lines)?;
         let path = self.folder.record(deal);

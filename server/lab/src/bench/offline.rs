@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use chefshat_benchmark::{AgentInfo, Task, TaskResult, check, play_offline};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
+use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_record::jsonl;
 use chefshat_simulation::Contender;
@@ -48,13 +49,21 @@ pub(super) fn play_all(
 
 /// Refuses a network that was trained for other games: it would play as another agent.
 pub(super) fn check_fits(task: &Task, entrant: &Entrant) -> Result<(), CommandError> {
-    match &entrant.contender {
-        Contender::Network(network) if !network.fits(&task.rule_set()) => Err(format!(
+    match fits(entrant, &task.rule_set()) {
+        true => Ok(()),
+        false => Err(format!(
             "{} was trained for games of another size than those of the task {}",
             entrant.given, task.name
         )
         .into()),
-        _ => Ok(()),
+    }
+}
+
+/// Whether an agent can play games of the size of these rules.
+pub(super) fn fits(entrant: &Entrant, rules: &RuleSet) -> bool {
+    match &entrant.contender {
+        Contender::Network(network) => network.fits(rules),
+        _ => true,
     }
 }
 

@@ -88,13 +88,18 @@ impl Pool {
         Ok((results, versus))
     }
 
+    /// The duplicate deals of each agent with each other. A network that was trained for games of
+    /// another size has none.
     fn pairs(&self, entrants: &[Entrant]) -> Result<Vec<Pair>, CommandError> {
         let rules = RuleSetSpec::default().validate()?;
-        let count = entrants.len() * entrants.len().saturating_sub(1);
+        let fitting = entrants.iter().enumerate();
+        let fitting = fitting.filter(|(_, it)| offline::fits(it, &rules));
+        let fitting: Vec<_> = fitting.collect();
+        let count = fitting.len() * fitting.len().saturating_sub(1);
         let bar = progress::of_items(count as u64 * self.deals, "deals");
         let mut pairs = Vec::with_capacity(count);
-        for (row, one) in entrants.iter().enumerate() {
-            for (column, others) in entrants.iter().enumerate().filter(|(it, _)| *it != row) {
+        for &(row, one) in &fitting {
+            for &(column, others) in fitting.iter().filter(|(it, _)| *it != row) {
                 let contenders = [one.contender.clone(), others.contender.clone()];
                 let plan = SeatPlan::One;
                 let duplicate =

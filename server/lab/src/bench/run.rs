@@ -10,6 +10,7 @@ use chefshat_cli::numbers::counted;
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::AgentCommand;
 use clap::Args;
+use tokio_util::task::TaskTracker;
 
 use super::deals_key::DealsKeyArg;
 use super::folder::Folder;
@@ -79,11 +80,14 @@ impl Run {
             return self.finish(self.play_offline(&task)?);
         }
         let mut stops = Stops::catch()?;
+        let closing = TaskTracker::new();
         let folder = tokio::select! {
-            folder = self.play_hosted(&task) => folder?,
+            folder = self.play_hosted(&task, &closing) => folder?,
             // Returning ends the agent's processes, which are in a process group of their own.
             stop = stops.next() => {
                 self.say_what_is_kept(&task);
+                closing.close();
+                closing.wait().await;
                 return Ok(stop.exit_code());
             }
         };
@@ -132,14 +136,18 @@ impl Run {
     }
 
     /// Plays with an agent that connects to a server.
-    async fn play_hosted(&self, task: &Task) -> Result<Folder, CommandError> {
+    async fn play_hosted(
+        &self,
+        task: &Task,
+        closing: &TaskTracker,
+    ) -> Result<Folder, CommandError> {
         let command = AgentCommand::for_games(self.command.clone())?;
         let deals = self.deals()?;
         let folder = self.folder(&self.command.join(" "), "", task)?;
         let parallel = usize::from(self.parallel);
         let server = self.server.as_deref();
         let missing = folder.missing(deals);
-        let played = hosted::play(&folder, &command, missing, parallel, server).await;
+        let played = hosted::play(&folder, &command, missing, parallel, server, closing).await;
         if played.is_err() {
             self.say_what_is_kept(task);
         }

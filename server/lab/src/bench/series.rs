@@ -17,6 +17,7 @@ use chefshat_record::language_model::ModelUsage;
 use clap::Args;
 use rayon::prelude::*;
 use tokio::task::spawn_blocking;
+use tokio_util::task::TaskTracker;
 use toml::de::{DeTable, DeValue};
 
 use super::deals_key::DealsKeyArg;
@@ -101,14 +102,16 @@ impl Series {
             }
             players.push(player);
         }
-        let stopped = Arc::new(AtomicBool::new(false));
+        let ending = Ending::default();
         let mut stops = Stops::catch()?;
         let is_complete = tokio::select! {
-            is_complete = self.play(&mut players, deals, &stopped) => is_complete,
+            is_complete = self.play(&mut players, deals, &ending) => is_complete,
             // Returning ends the agents' processes.
             stop = stops.next() => {
-                stopped.store(true, Ordering::Relaxed);
+                ending.stopped.store(true, Ordering::Relaxed);
                 anstream::eprintln!("the records are kept; the same command resumes");
+                ending.closing.close();
+                ending.closing.wait().await;
                 return Ok(stop.exit_code());
             }
         };
@@ -120,7 +123,7 @@ impl Series {
     }
 
     /// Plays all deals, or until the budget ends. Returns whether nothing has failed.
-    async fn play(&self, players: &mut [Player], deals: usize, stopped: &Arc<AtomicBool>) -> bool {
+    async fn play(&self, players: &mut [Player], deals: usize, ending: &Ending) -> bool {
         let parallel = usize::from(self.parallel);
         let round = match self.budget {
             Some(_) => parallel,
@@ -156,8 +159,7 @@ impl Series {
                 if player.has_ended || missing.is_empty() {
                     continue;
                 }
-                let played =
-                    player.play(missing.clone(), parallel, self.server.as_deref(), stopped);
+                let played = player.play(missing.clone(), parallel, self.server.as_deref(), ending);
                 let played = played.await;
                 if self.budget.is_some() {
                     player.read(missing).await;
@@ -197,6 +199,15 @@ impl Series {
     }
 }
 
+/// What ends with a series that is stopped.
+#[derive(Default)]
+struct Ending {
+    /// Whether games in this process end.
+    stopped: Arc<AtomicBool>,
+    /// Closes the rooms of games that do not end.
+    closing: TaskTracker,
+}
+
 /// How an agent plays.
 enum Runner {
     /// In this process.
@@ -226,23 +237,24 @@ impl Player {
         self.folder.missing(deals).is_empty()
     }
 
-    /// Plays the games of these deals, until `stopped`.
+    /// Plays the games of these deals.
     async fn play(
         &self,
         deals: Vec<usize>,
         parallel: usize,
         server: Option<&str>,
-        stopped: &Arc<AtomicBool>,
+        ending: &Ending,
     ) -> Result<(), CommandError> {
         match &self.runner {
             Runner::Offline(entrant) => {
                 let (folder, entrant) = (Arc::clone(&self.folder), Arc::clone(entrant));
-                let stopped = Arc::clone(stopped);
+                let stopped = Arc::clone(&ending.stopped);
                 spawn_blocking(move || offline::play_all(&folder, &entrant, deals, &stopped))
                     .await?
             }
             Runner::Connected(command) => {
-                hosted::play(&self.folder, command, deals, parallel, server).await
+                let closing = &ending.closing;
+                hosted::play(&self.folder, command, deals, parallel, server, closing).await
             }
         }
     }

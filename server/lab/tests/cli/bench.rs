@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::run::{Ended, chefshat, fixture, typed};
+use super::run::{Ended, chefshat, fixture, serve, typed};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_chefshat-lab");
 
@@ -231,7 +231,8 @@ fn hidden_deals_are_played_and_checked_with_their_key_alone() {
     let files = ["greedy", "connected"].map(|name| out(name).join("result.json"));
     let files = format!("bench table {} {}", files[0].display(), files[1].display());
     typed(&files).assert_failed("greedy has hidden deals");
-    typed(&format!("{files} --versus nobody")).assert_failed("none of the results has this name");
+    typed(&format!("{files} --versus nobody"))
+        .assert_failed("no result on the same deals has this name");
     typed(&format!("{files} --versus it"))
         .well()
         .assert_says(&["not checked"]);
@@ -318,6 +319,53 @@ fn the_pool_has_a_row_and_a_column_for_each_agent() {
         pairs[1]["difference"].as_f64() > Some(0.0),
         "greedy is better: {pairs:?}"
     );
-    let text = typed(&format!("bench pool {flags}")).well();
+    // A network for games of another size has no games with the others.
+    let small = fixture("network/small-table.safetensors");
+    let agents = format!("random,greedy,{}", small.display());
+    let text = typed(&format!(
+        "bench pool --agents {agents} --deals 10 --task-deals 10"
+    ))
+    .well();
     text.assert_table_fits(10);
+}
+
+#[test]
+fn a_result_with_which_nothing_can_be_compared_leaves_the_others_in_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = |name: &str| folder.path().join(name);
+    run("small_deck", &out("small"), &["--agent", "greedy"]);
+    run("shift", &out("large"), &["--agent", "greedy"]);
+    let network = fixture("network/table-actions.safetensors");
+    let folders = format!("{} {}", out("small").display(), out("large").display());
+    let table = typed(&format!(
+        "bench table {folders} --versus {}",
+        network.display()
+    ))
+    .well();
+    assert!(table.stderr.contains("left out: small_deck: "), "{table:?}");
+    table.assert_says(&["ChefsHat-v1 shift"]);
+    assert!(!table.stdout.contains("small_deck"), "{}", table.stdout);
+}
+
+#[test]
+#[cfg(unix)]
+fn rooms_of_an_agent_that_has_exited_are_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_server, url) = serve(folder.path());
+    let out = folder.path().join("out");
+    let exits = [
+        "--parallel",
+        "4",
+        "--name",
+        "it",
+        "--server",
+        &url,
+        "--",
+        "sh",
+        "-c",
+        "read line; exit 3",
+    ];
+    run("shift", &out, &exits).assert_failed("exit");
+    let rooms = typed(&format!("room list --server {url}")).well();
+    assert!(!rooms.stdout.contains("waiting"), "{rooms:?}");
 }
