@@ -235,28 +235,25 @@ def club() -> Players:
     return Players(AgentSpec("club_players:Largest", "Ada"), 2, attempts=5)
 
 
-SEAT = asked(0).seat_info
-
-
 def test_each_parallel_game_has_a_process_which_plays_game_after_game(caplog: pytest.LogCaptureFixture) -> None:
     players = club()
     one, other = players.processes
-    first, second = players.seat(SEAT), players.seat(SEAT)
+    first, second = players.agent(), players.agent()
     assert (first._process, second._process) == (one, other)
     second.on_game_over(SeatResult("room", "game", 0))
-    assert players.seat(SEAT)._process is other
+    assert players.agent()._process is other
     assert (players.crowded, caplog.text) == (0, "")
     # One more than there are processes.
-    assert players.seat(SEAT)._process is one
+    assert players.agent()._process is one
     assert players.crowded == 1
     assert "no process is free" in caplog.text
 
 
 def test_a_lost_seat_frees_its_process() -> None:
     players = club()
-    first, _ = players.seat(SEAT), players.seat(SEAT)
+    first, _ = players.agent(), players.agent()
     first.on_seat_lost(ChefsHatError("SUPERSEDED"))
-    assert players.seat(SEAT)._process is players.processes[0]
+    assert players.agent()._process is players.processes[0]
     assert players.crowded == 0
 
 
@@ -264,11 +261,11 @@ def test_a_process_that_was_given_up_is_used_last() -> None:
     players = club()
     one, other = players.processes
     one.close()
-    first = players.seat(SEAT)
+    first = players.agent()
     assert (one.given_up, first._process) == (True, other)
-    assert players.seat(SEAT)._process is one
+    assert players.agent()._process is one
     first.on_game_over(SeatResult("room", "game", 0))
-    assert players.seat(SEAT)._process is other
+    assert players.agent()._process is other
     assert players.crowded == 0
 
 
@@ -276,7 +273,7 @@ def test_failures_are_counted_by_game_and_in_total() -> None:
     players = club()
     for process in players.processes:
         process.close()
-    agents = [players.seat(SEAT) for _ in range(2)]
+    agents = [players.agent() for _ in range(2)]
     for agent in agents:
         begin(agent, 2)
         assert agent.decide(asked(0, 199)) == 199

@@ -73,7 +73,7 @@ def play(client: Client, players: Players, way: JoinOptions, *, as_json: bool) -
     """Plays the game of one room, or a tournament, and prints the result. Returns 0 if it was finished, else 1."""
     way = replace(way, name=way.name or players.name[:MAX_NAME])
     before = own_counts(players)
-    played = join_options.take_part(client, way, players.seat, check_rules=check_rules, prepare=players.prepare)
+    played = join_options.take_part(client, way, lambda _: players.agent(), check_rules=check_rules, prepare=players.prepare)
     own = {what: count - before[what] for what, count in own_counts(players).items()}
     words = "{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own)
     if own["crowded"]:

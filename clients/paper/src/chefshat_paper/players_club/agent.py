@@ -33,6 +33,8 @@ DECLINE = len(ACTIONS) + FACES + 1
 DECLARE = DECLINE + 1
 # Cards that the Chef and the Sous-Chef choose to give.
 GIVEN_BY: dict[int, int] = {pb.ROLE_CHEF: 2, pb.ROLE_SOUS_CHEF: 1}
+# Annotation of decisions that the agent did not take itself.
+FALLBACK = "fallback"
 # Failures to log. An agent that fails usually does so at every decision.
 TOLD = 3
 
@@ -141,7 +143,7 @@ class PlayersClubAgent(Agent):
         scores = self._numbers(vector)
         if scores is None:
             self._seen.asked(vector, replaced=True)
-            return self._replaced(request.default_action)
+            return self._default(request)
         choice = int(np.argmax(scores))
         legal = request.legal_actions
         if choice in legal:
@@ -175,16 +177,16 @@ class PlayersClubAgent(Agent):
                 answer = self._process.call("get_exhanged_cards", cards, amount)
             except AgentError as error:
                 self._failed(error)
-                return self._replaced(request.default_action)
+                return self._default(request)
             if not (is_numbers(answer) and len(answer) == amount and all(card in range(1, JOKER + 1) for card in answer)):
                 self._failed(f"get_exhanged_cards returned {_shape(answer)}, not a list of {amount} of its cards")
-                return self._replaced(request.default_action)
+                return self._default(request)
             self._to_give = [int(card) for card in answer]
         action = GIVE + self._to_give.pop(0)
         if action in legal or insists:
             return action
         self._failed("get_exhanged_cards chose cards that are not in its hand")
-        return self._replaced(request.default_action)
+        return self._default(request)
 
     def _special_action(self, request: Decision) -> int:
         dishwasher = int(request.roles[request.seat]) == pb.ROLE_DISHWASHER
@@ -192,7 +194,7 @@ class PlayersClubAgent(Agent):
             answer = self._process.call("do_special_action", self._seen.info, FOOD_FIGHT if dishwasher else DINNER_SERVED)
         except AgentError as error:
             self._failed(error)
-            return self._replaced(request.default_action)
+            return self._default(request)
         return DECLARE if answer else DECLINE
 
     def _notify(self, calls: Sequence[Call]) -> None:
@@ -203,6 +205,11 @@ class PlayersClubAgent(Agent):
                 self._process.call(call.method, *call.arguments)
             except AgentError as error:
                 self._failed(error)
+
+    def _default(self, request: Decision) -> int:
+        """Takes the default action for a player that fails. Records and results count it as a fallback."""
+        request.annotate(extra={FALLBACK: "the player failed"})
+        return self._replaced(request.default_action)
 
     def _replaced(self, action: int) -> int:
         self.counts.replaced += 1

@@ -13,8 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
-from chefshat.decision import SeatInfo
-
 from chefshat_paper.players_club.agent import Counts, PlayersClubAgent
 from chefshat_paper.players_club.process import AgentLost, AgentProcess, AgentSpec
 
@@ -25,7 +23,7 @@ PROCESS = "{process}"
 
 
 class Players:
-    """The started processes; a context manager. `seat` creates the agent of each game.
+    """The started processes; a context manager. `agent` creates the agent of each game.
 
     Attributes:
         processes: all processes.
@@ -96,8 +94,8 @@ class Players:
         """Number of restarts of all processes."""
         return sum(process.restarts for process in self.processes)
 
-    def seat(self, seat: SeatInfo) -> PlayersClubAgent:
-        """Assigns a free process to the seat, preferably one that has not been given up."""
+    def agent(self) -> PlayersClubAgent:
+        """Creates the agent of a game, with a free process, preferably one that has not been given up."""
         playing = self._playing
         free = [process for process in self.processes if process not in playing or playing[process].over]
         if free:
@@ -106,7 +104,7 @@ class Players:
             # The next game may begin before the end of the last one arrives.
             process = next(iter(playing))
             self.crowded += 1
-            LOG.warning("no process is free for the game in room %s: assigning a busy one", seat.room_id)
+            LOG.warning("no process is free for another game: assigning a busy one")
         # Ordered by the start of the latest game.
         playing.pop(process, None)
         playing[process] = agent = PlayersClubAgent(process, attempts=self._attempts, total=self.counts)
