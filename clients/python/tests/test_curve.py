@@ -166,3 +166,22 @@ def test_interquartile_means() -> None:
     assert low < middle < high
     with pytest.raises(ValueError, match="two runs or more"):
         interquartile_mean(np.ones(1))
+
+
+def test_a_coalition_is_drawn_with_its_partner() -> None:
+    def log(seed: int, plan: dict[str, object], opponents: list[str]) -> str:
+        one = {"opponents": opponents, "points": 2.0, "standard_error": 0.5, "games": 2}
+        looks = [{"event": "evaluation", "decisions": at, "evaluations": [one]} for at in (0, 10)]
+        setup = {"event": "setup", "rules": {"players": 4, "points": [5, 3, 1, 0]}, "seed": seed, "plan": plan}
+        return "\n".join(map(json.dumps, [setup, *looks]))
+
+    pairs = [read(log(seed, {"coalition": True}, ["random", "itself", "random"])) for seed in (1, 2)]
+    (panel,) = figure(pairs).panels
+    assert (panel.title, len(panel.lines)) == ("Against random, itself, random", 1)
+    with pytest.raises(ValueError, match="--baselines"):
+        figure(pairs, ["greedy"])
+    # Logs of earlier versions do not say that there is no coalition.
+    plans: list[dict[str, object]] = [{}, {"coalition": False}]
+    alone = [read(log(seed, plan, ["greedy"] * 3)) for seed, plan in enumerate(plans)]
+    (panel,) = figure(alone).panels
+    assert [line.label for line in panel.lines] == ["the policy: interquartile mean of 2 runs"]

@@ -128,3 +128,12 @@ def test_built_in_agents_and_files_are_players() -> None:
     assert found == compare(str(file), "greedy", "greedy", deals=4, seed=1, seats=[0])
     with pytest.raises(ChefsHatError, match="there is no agent"):
         evaluate("clever", "random", games=1)
+
+
+def test_a_network_of_turns_leaves_other_decisions_to_its_opponents() -> None:
+    turns, strong = network.load(FIXTURES / "classic-turns.safetensors"), network.load("trained")
+    as_object = evaluate(turns, strong, games=20, seed=1)
+    as_name = evaluate(turns, "trained", games=20, seed=1)
+    assert (as_object.shifts, as_object.points, as_object.places) == (as_name.shifts, as_name.points, as_name.places)
+    with pytest.raises(ValueError, match="turns alone"):
+        evaluate(turns, strong.actions_of, games=1)

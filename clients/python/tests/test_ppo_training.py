@@ -14,7 +14,7 @@ from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Opponent, Plan
 from chefshat.learn.ppo_training import Trainer
-from chefshat.learn.runs import full_rules
+from chefshat.learn.runs import INTERRUPTED, full_rules
 
 pytestmark = pytest.mark.server
 
@@ -57,7 +57,7 @@ def test_a_coalition_is_evaluated_with_its_partner(real_address: str, tmp_path: 
     assert "--coalition needs --opponent-games" in json.loads(capsys.readouterr().out)["message"]
     assert command.main([*common, "--games", "0", "--opponent-games", "8", "--opponents", "random", "--coalition"]) == 0
     trained = json.loads(capsys.readouterr().out)
-    assert [one["opponents"] for one in trained["evaluations"]] == [["greedy"] * 3, ["random"] * 3, ["random", "pair", "random"]]
+    assert [one["opponents"] for one in trained["evaluations"]] == [["greedy"] * 3, ["random"] * 3, ["random", "itself", "random"]]
 
 
 @pytest.mark.slow
@@ -183,7 +183,7 @@ def test_an_interrupted_training_is_evaluated_like_another(
 
     with monkeypatch.context() as patched:
         patched.setattr(Trainer, "update", interrupted)
-        assert command.main([*options, *plan]) == 0
+        assert command.main([*options, *plan]) == INTERRUPTED
     assert [line["decisions"] for line in curve.read(log.read_text()).evaluations] == [0, 256]
     assert command.main([*options, "--resume"]) == 0
     assert [line["decisions"] for line in curve.read(log.read_text()).evaluations] == [0, 512, 1024]

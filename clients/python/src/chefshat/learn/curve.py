@@ -21,6 +21,7 @@ from chefshat.learn import plots
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.figures import Figure, Level, Line, Panel
 from chefshat.learn.runs import EVALUATION_SEED
+from chefshat.learn.training_log import ITSELF
 
 ORIGIN = "`python -m chefshat.learn ppo` writes one next to its network, as .jsonl, and so does `deep-q` of chefshat-paper"
 # Half the width of a 95% interval of the normal distribution, in standard deviations.
@@ -62,6 +63,9 @@ def read(log: str) -> Run:
         raise ValueError("the log has no evaluation; did the training end before the first?")
     setup = next((line for line in lines if line.get("event") == "setup"), {})
     rules, plan = setup.get("rules"), dict(setup.get("plan", {}))
+    if not plan.get("coalition"):
+        # Logs of earlier versions do not say that there is none.
+        plan.pop("coalition", None)
     hyper = plan.pop("hyper", {})
     settings = {**plan, **hyper, **{f"rules {name}": value for name, value in (rules or {}).items()}}
     # A training that was resumed may have evaluated twice at the same place.
@@ -103,7 +107,7 @@ def figure(runs: Sequence[Run], baselines: Sequence[str] = ()) -> Figure:
     unit, name = (1_000_000, "millions") if most >= 1_000_000 else (1_000, "thousands")
     panels = [
         Panel(
-            title=f"Against {len(names)} {names[0]}",
+            title=f"Against {len(names)} {names[0]}" if len(set(names)) == 1 else f"Against {', '.join(names)}",
             x_label=f"decisions of the training, {name}",
             y_label="points per Shift",
             lines=[_line(group, number, _label(group, groups), unit) for group in groups],
@@ -122,6 +126,8 @@ def _levels(runs: Sequence[Run], number: int, baselines: Sequence[str]) -> list[
     rules, evaluated = runs[0].rules, runs[0].evaluations[0]["evaluations"][number]
     if rules is None or any(run.rules != rules for run in runs):
         raise ValueError("baselines play by the rules of the trainings, which must all have the same: draw others apart")
+    if ITSELF in evaluated["opponents"]:
+        raise ValueError("a coalition plays with what it has learned, which no baseline has: leave out --baselines")
     played = [
         evaluate(name, evaluated["opponents"], games=evaluated["games"], seed=EVALUATION_SEED, rules=rules) for name in baselines
     ]

@@ -251,13 +251,23 @@ def _play_in_batches(player: _PlayerInBatch, opponents: Sequence[_OpponentInBatc
     if isinstance(player, (str, Path)) and is_network_file(player):
         player = network_file.load(player)
     network = player if isinstance(player, Network) else None
+    turns_alone = network is not None and network.info.output == "turns"
+    if turns_alone and any(callable(opponent) for opponent in opponents):
+        raise ValueError(
+            "a network that decides on turns alone cannot play against functions, which would not be asked for other decisions "
+            "either: give networks or built-in agents as opponents"
+        )
     with VectorEnv(
         wanted.address,
         min(wanted.games, SIDE_BY_SIDE),
         client_seats=[seat],
-        opponents=[opponent.actions_of if isinstance(opponent, Network) else opponent for opponent in opponents],
+        # As a file, a network decides by itself what it was trained for.
+        opponents=[
+            network_file.encoded(opponent.layers, opponent.info) if isinstance(opponent, Network) else opponent
+            for opponent in opponents
+        ],
         episode="shift",
-        decisions="turns" if network and network.info.output == "turns" else "all",
+        decisions="turns" if turns_alone else "all",
         skip_forced=True,
         total_games=wanted.games,
         seed=wanted.seed,

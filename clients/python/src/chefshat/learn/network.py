@@ -242,17 +242,23 @@ def save(
     *,
     dtype: type[np.float16] | type[np.float32] = np.float32,
 ) -> None:
-    """Writes a network to a file atomically.
+    """Writes a network to a file atomically; an existing one is replaced.
+
+    Raises ValueError as `encoded`, OSError if the file cannot be written.
+    """
+    write_atomically(path, encoded(layers, info, dtype=dtype))
+
+
+def encoded(layers: Sequence[AnyLayer], info: NetworkInfo, *, dtype: type[np.float16] | type[np.float32] = np.float32) -> bytes:
+    """Returns the content of a network's file.
 
     Args:
-        path: the file; an existing one is replaced.
         layers: (weight, bias) of each layer, first to last.
         info: the description.
         dtype: type of the numbers in the file.
 
     Raises:
         ValueError: the layers do not fit each other or the description, or contain numbers out of the range of `dtype`.
-        OSError: the file cannot be written.
     """
     tensors: dict[str, npt.NDArray[np.floating]] = {}
     for number, (weight, bias) in enumerate(Network(layers, info).layers):
@@ -261,7 +267,7 @@ def save(
             tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"] = weight.astype(dtype), bias.astype(dtype)
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
         raise ValueError(f"its weights are too large for {dtype.__name__}")
-    write_atomically(path, safetensors.numpy.save(tensors, metadata=info.metadata()))
+    return safetensors.numpy.save(tensors, metadata=info.metadata())
 
 
 def load(path: str | os.PathLike[str]) -> Network:

@@ -27,7 +27,7 @@ from chefshat.learn.ppo_checkpoint import Opponent, Plan, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
-from chefshat.learn.training_log import Progress
+from chefshat.learn.training_log import ITSELF, Progress
 
 # A coalition has the seats 0 and 2.
 COALITION_PLAYERS = 3
@@ -50,15 +50,20 @@ def run(options: argparse.Namespace) -> int:
                 training_log.log_setup("ppo", dataclasses.asdict(begun.plan), begun.seed, begun.rules, begun.trained_by)
                 with Scalars(options.tensorboard) as scalars:
                     evaluations = _train(trainer, options, state, scalars, evaluated)
+                is_stopped = _share_done(options, trainer.training.progress) < 1
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
+    progress = trainer.training.progress
     if options.json:
-        print(json.dumps({"event": "trained", "file": str(out), **training_log.summary(trainer.training.progress, evaluations)}))
+        event = "interrupted" if is_stopped else "trained"
+        print(json.dumps({"event": event, "file": str(out), **training_log.summary(progress, evaluations)}))
     else:
-        print(f"{out}: {trainer.training.progress.decisions:,} decisions")
+        print(f"{out}: {progress.decisions:,} decisions")
         for evaluation in evaluations:
             print(f"  {evaluation}")
-    return 0
+        if is_stopped:
+            print("interrupted: resume by the same command with --resume", file=sys.stderr)
+    return runs.INTERRUPTED if is_stopped else 0
 
 
 def _start(options: argparse.Namespace) -> Training:
@@ -146,20 +151,25 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: 
             if done >= next_evaluation:
                 next_evaluation = training_log.next_evaluation(done, evaluations)
                 # Saves first: an evaluation may fail.
-                ppo_checkpoint.save(state, trainer.training)
+                _save(trainer, options, state)
                 _evaluate(trainer, options, losses, scalars)
             losses = trainer.update(done)
             scalars.add("losses", losses, trainer.training.progress.decisions)
             bar.n = round(1000 * done)
             bar.set_postfix_str(f"{trainer.training.progress.decisions:,} decisions, entropy {losses['entropy']:.2f}")
     # Saves first: a second Ctrl-C may interrupt the last evaluation.
-    ppo_checkpoint.save(state, trainer.training)
-    trained = trainer.training.network(options.name)
-    network.save(options.out, trained.layers, trained.info, dtype=np.float16)
+    _save(trainer, options, state)
     stopped = _share_done(options, trainer.training.progress) < 1
     last = _evaluate(trainer, options, losses, scalars, stopped=stopped)
     ppo_checkpoint.save(state, trainer.training)
     return last
+
+
+def _save(trainer: Trainer, options: argparse.Namespace, state: Path) -> None:
+    """Writes the checkpoint and the network."""
+    ppo_checkpoint.save(state, trainer.training)
+    learned = trainer.training.network(options.name)
+    network.save(options.out, learned.layers, learned.info, dtype=np.float16)
 
 
 def _share_done(options: argparse.Namespace, progress: Progress) -> float:
@@ -179,7 +189,7 @@ def _evaluate(
     further: list[OneOpponent] = list(trainer.opponents) if plan.opponent_games else []
     if plan.coalition:
         others = further if len(further) > 1 else further * (training.rules.players - 2)
-        further = [others[0], learned, *others[1:]]
+        further = [others[0], training.network(ITSELF), *others[1:]]
     address = join_options.server_if_any(options)
     evaluations = training_log.evaluate_all(learned, plan.evaluation_games, training.rules, address, further=further)
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)

@@ -23,6 +23,8 @@ from chefshat.learn.network import Network
 LOG = logging.getLogger("chefshat.learn")
 # Whom every training is evaluated against.
 OPPONENTS = ("greedy", "random")
+#: The name of the partner among the opponents of a coalition: what has been learned so far.
+ITSELF = "itself"
 
 
 @dataclass(frozen=True)
