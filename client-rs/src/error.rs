@@ -63,6 +63,11 @@ impl Error {
         &self.metadata
     }
 
+    /// Whether a stream that ended with this may be opened again: it would not be refused again.
+    pub fn may_retry(&self) -> bool {
+        may_retry(self.code)
+    }
+
     fn own(code: Code, reason: &str, message: String) -> Self {
         Self {
             code,

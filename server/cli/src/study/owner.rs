@@ -6,11 +6,11 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use chefshat_client::Error;
 use chefshat_proto::v1;
 use chrono::{DateTime, SecondsFormat};
 use clap::Args;
 use serde_json::json;
-use tonic::{Code, Status};
 
 use super::connection::{refused, service};
 use crate::connect::{OwnerArgs, PATIENCE, ServerArg};
@@ -238,23 +238,23 @@ impl Follow {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         let mut shown = Shown::default();
         let mut reached = Instant::now();
-        while let Err(status) = self.follow(&mut shown, &mut reached).await? {
-            // It stops or moves to another node, where the study goes on.
-            if status.code() != Code::Unavailable || reached.elapsed() >= PATIENCE {
-                return Err(refused(status));
+        while let Some(error) = self.follow(&mut shown, &mut reached).await? {
+            // The server stops, has died, or hands the study to another node, where it goes on.
+            if !error.may_retry() || reached.elapsed() >= PATIENCE {
+                return Err(error.into());
             }
             tokio::time::sleep(FOLLOW_AGAIN).await;
         }
         Ok(())
     }
 
-    /// Shows changes until the study is over, or the connection is lost. `reached` is when the server
-    /// sent the last one.
+    /// Shows changes until the study is over, or the server ends the stream before, and returns why it
+    /// did. `reached` is when the server sent the last one.
     async fn follow(
         &self,
         shown: &mut Shown,
         reached: &mut Instant,
-    ) -> Result<Result<(), Status>, CommandError> {
+    ) -> Result<Option<Error>, CommandError> {
         let mut service = service(&self.owned.server).await?;
         let request = v1::FollowStudyRequest {
             study_id: self.owned.study_id.clone(),
@@ -262,13 +262,13 @@ impl Follow {
         };
         let mut updates = match service.follow_study(request).await {
             Ok(followed) => followed.into_inner(),
-            Err(status) => return Ok(Err(status)),
+            Err(status) => return Ok(Some(status.into())),
         };
         loop {
             let update = match updates.message().await {
                 Ok(Some(update)) => shown.new_in(update),
-                Ok(None) => return Ok(Ok(())),
-                Err(status) => return Ok(Err(status)),
+                Ok(None) => return Ok(None),
+                Err(status) => return Ok(Some(status.into())),
             };
             *reached = Instant::now();
             if self.owned.json {

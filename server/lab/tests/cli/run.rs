@@ -209,9 +209,14 @@ pub(super) fn serve(data_dir: &Path) -> (Running, String) {
 
 /// A server with more flags, and its address.
 pub(super) fn serve_with(data_dir: &Path, flags: &[&str]) -> (Running, String) {
+    serve_at("127.0.0.1:0", data_dir, flags)
+}
+
+/// A server at an address, and that address as a URL.
+pub(super) fn serve_at(listen: &str, data_dir: &Path, flags: &[&str]) -> (Running, String) {
     let mut command = program();
     command.arg("serve").args(flags);
-    command.args(["--listen", "127.0.0.1:0", "--json", "--data-dir"]);
+    command.args(["--listen", listen, "--json", "--data-dir"]);
     // Both are false, so records are written.
     command.env("CHEFSHAT_NO_RECORDS", "0");
     command.env("CHEFSHAT_LOG_JSON", "");

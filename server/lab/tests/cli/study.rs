@@ -2,6 +2,7 @@
 //! deleted.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use chefshat_client::Client;
@@ -10,7 +11,7 @@ use chefshat_proto::v1::participation_service_client::ParticipationServiceClient
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat, in_runtime, run, serve};
+use super::run::{Ended, Running, chefshat, in_runtime, run, serve, serve_at};
 
 /// The example of the documentation.
 const EXAMPLE: &str = concat!(
@@ -43,6 +44,28 @@ fn a_study_is_created_and_deleted() {
     owned("show").assert_failed("no study with this id and owner token");
     owned("delete --yes").assert_failed("no study with this id and owner token");
     chefshat(&["study", "--help"]).assert_helps("chefshat study links");
+}
+
+#[test]
+fn a_study_is_followed_across_the_death_of_its_server() {
+    let folder = TempDir::new().unwrap();
+    let (data, owner) = (folder.path().join("data"), folder.path().join("owner"));
+    let (server, url) = serve(&data);
+    let id = create(&url, &owner);
+    let owned = format!("{id} --json --owner-file {}", owner.display());
+    let mut following = Running::start(&url, &format!("study follow {owned}"));
+    let lines = BufReader::new(following.0.stdout.take().unwrap()).lines();
+    let mut lines = lines.map(|line| serde_json::from_str::<Value>(&line.unwrap()).unwrap());
+    let first = lines.next().unwrap();
+    assert_eq!(first["study"]["studyId"], id);
+    drop(server);
+    let address = url.trim_start_matches("http://");
+    let (_server, _) = serve_at(address, &data, &[]);
+    run(&url, &format!("study close {owned}")).well();
+    // What was shown is not shown again.
+    let rest: Vec<Value> = lines.collect();
+    assert!(!rest.is_empty() && !rest.contains(&first), "{rest:?}");
+    assert_eq!(following.0.wait().unwrap().code(), Some(0));
 }
 
 /// The example of the documentation with pairs.
