@@ -180,7 +180,7 @@ def test_a_coalition_is_drawn_with_its_partner() -> None:
     assert (panel.title, len(panel.lines)) == ("Against random, itself, random", 1)
     with pytest.raises(ValueError, match="--baselines"):
         figure(pairs, ["greedy"])
-    # Logs of earlier versions do not say that there is no coalition.
+    # Logs of earlier versions lack this setting.
     plans: list[dict[str, object]] = [{}, {"coalition": False}]
     alone = [read(log(seed, plan, ["greedy"] * 3)) for seed, plan in enumerate(plans)]
     (panel,) = figure(alone).panels

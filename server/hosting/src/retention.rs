@@ -139,12 +139,11 @@ impl Retention {
             return Ok(0);
         }
         let data_dir = self.rooms.record_writer().data_dir();
-        let mut begun: BTreeSet<GameId> = self.left_over().into_iter().collect();
-        begun.extend(&games);
+        let mut left: BTreeSet<GameId> = self.left_over().into_iter().collect();
+        left.retain(|game| !games.contains(game));
         if let Some(data_dir) = data_dir {
-            note(data_dir, &begun);
+            note(data_dir, left.iter().chain(&games));
         }
-        let asked = games.clone();
         let (deleted, mut undeleted) = self.rooms.prune_games(games).await?;
         let count = deleted.len() as u64;
         if let Some(data_dir) = data_dir {
@@ -162,9 +161,8 @@ impl Retention {
             for (game, error) in &undeleted {
                 warn!(%game, %error, "a file of a deleted game was not deleted; the next run tries again");
             }
-            begun.retain(|game| !asked.contains(game));
-            begun.extend(undeleted.keys());
-            note(data_dir, &begun);
+            left.extend(undeleted.keys());
+            note(data_dir, left.iter());
         }
         Ok(count)
     }
@@ -190,9 +188,9 @@ impl Retention {
 }
 
 /// Notes the games whose deletion has begun.
-fn note(data_dir: &Path, games: &BTreeSet<GameId>) {
+fn note<'g>(data_dir: &Path, games: impl Iterator<Item = &'g GameId>) {
     let path = data_dir.join(PRUNING);
-    let ids: Vec<String> = games.iter().map(GameId::to_string).collect();
+    let ids: Vec<String> = games.map(GameId::to_string).collect();
     let noted = match ids.is_empty() {
         true => atomic_file::remove(&path),
         false => std::fs::write(path, ids.join("\n")),
@@ -287,7 +285,7 @@ mod tests {
         assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 0]);
         assert!(!pruning.exists());
 
-        // What cannot be deleted holds up nothing else: a folder is no file that could be removed.
+        // A folder with the name of a file cannot be removed as a file; the others are.
         let stuck = files(5);
         std::fs::create_dir_all(&stuck[0]).expect("created");
         for path in [&stuck[1], &files(6)[0]] {

@@ -353,7 +353,7 @@ mod tests {
         let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
         let games = [1, 2].map(|id| GameId::from_bytes([id; 16]));
         let path = |game: GameId, seat| samples::path_of(folder.path(), &game.to_string(), seat);
-        // A folder is no file that could be removed.
+        // A folder with the name of a file, which cannot be removed as a file.
         std::fs::create_dir_all(path(games[0], 0)).expect("created");
         for path in [path(games[0], 1), path(games[1], 0)] {
             std::fs::write(path, "").expect("written");

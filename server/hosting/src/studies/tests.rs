@@ -335,7 +335,7 @@ async fn samples_that_cannot_be_deleted_stop_no_study_and_are_tried_again() {
     let _present = lab.begin().await;
     let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
     let game = convert::game_of(&game).to_string();
-    // A folder is no file that could be removed.
+    // A folder with the name of the file, which cannot be removed as a file.
     let stuck = samples::path_of(folder.path(), &game, 0);
     std::fs::create_dir_all(&stuck).expect("created");
 

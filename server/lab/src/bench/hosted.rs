@@ -41,8 +41,8 @@ const QUIET: Duration = Duration::from_secs(30);
 pub(super) const FAILURES: usize = 5;
 
 /// Plays the games of these deals. Games that fail are named and leave the others alone, unless several
-/// fail in a row. `closing` closes the rooms of games that do not end; whoever drops the future waits
-/// for it.
+/// fail in a row. The rooms of games that do not end are closed by tasks of `closing`. Wait for them
+/// after the future was dropped.
 pub(super) async fn play(
     folder: &Folder,
     command: &AgentCommand,
@@ -90,7 +90,7 @@ pub(super) async fn play(
 struct OpenRoom {
     client: Client,
     closing: TaskTracker,
-    /// Whoever waits for `closing` waits for this as well.
+    /// Waiting for `closing` includes this.
     _token: TaskTrackerToken,
     /// Its id and its owner token; `None`: its game is over.
     secrets: Option<(String, String)>,

@@ -64,7 +64,7 @@ def read(log: str) -> Run:
     setup = next((line for line in lines if line.get("event") == "setup"), {})
     rules, plan = setup.get("rules"), dict(setup.get("plan", {}))
     if not plan.get("coalition"):
-        # Logs of earlier versions do not say that there is none.
+        # Logs of earlier versions lack this setting.
         plan.pop("coalition", None)
     hyper = plan.pop("hyper", {})
     settings = {**plan, **hyper, **{f"rules {name}": value for name, value in (rules or {}).items()}}
