@@ -5,7 +5,7 @@ messages of the protocol.
 """
 
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,6 +73,19 @@ class Batch:
     @property
     def done(self) -> bool:
         """Whether all games are over and none follows."""
+
+    @property
+    def ended(self) -> int:
+        """Number of episodes that have ended."""
+
+    def first(
+        self, form: Literal["table", "classic"] | None, ended: bool
+    ) -> tuple[NDArray[np.float32] | None, NDArray[np.int8], float, int, int, int] | None:
+        """Returns the first open decision, or the end of the first episode if `ended`.
+
+        These are the observation of the form (None: none), the mask as numbers, the reward, the seat, the kind of the decision and
+        the invalid attempts; the last two are 0 at an end. None without rows, and once the table has been handed over.
+        """
 
     def decisions(self) -> tuple[int, NDArray[np.uint8]]:
         """Hands over the open decisions."""

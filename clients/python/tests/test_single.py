@@ -1,19 +1,22 @@
-"""One game of Gymnasium or PettingZoo, whose rows are looked up: every number is that of the columns."""
+"""One game of Gymnasium or PettingZoo, whose rows the engine reads: every number is that of the columns."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
-from chefshat.columns import Table
+from chefshat.batch import Batch, Situation
 from chefshat.learn import features
-from chefshat.vector import Batch, VectorEnv
+from chefshat.vector import VectorEnv
 
 pytest.importorskip("chefshat_native")
 pytest.importorskip("gymnasium")
 
 from chefshat.envs import ChefsHatEnv
-from chefshat.envs.single import SingleRow
+from chefshat.envs.observing import Form
+
+#: The observations that the engine computes for a row.
+FORMS: Any = {"table": features.table_of, "classic": features.classic_of, None: None}
 
 
 @pytest.mark.parametrize("rules", [None, {"players": 2, "faces": 4}, {"players": 6, "faces": 12, "jokers": 1}])
@@ -25,22 +28,26 @@ def test_rows_are_those_of_the_columns(rules: Any) -> None:
         with VectorEnv(rules=rules, seed=6, rewards="winning", client_seats=[seat], invalid="ask_again") as env:
             chance = np.random.default_rng(seat)
             env.sample(seat)
-            readers: dict[type[Table], SingleRow] = {}
             for _ in range(steps):
                 action = env.sample() if chance.random() < 0.9 else chance.integers(0, env.num_actions, 1)
                 batch = env.step(action)
-                for table in (batch, batch.endings):
-                    if len(table) != 1:
+                found = [(form, ended, batch.first(form, ended=ended)) for form in FORMS for ended in (False, True)]
+                assert batch.ended == len(batch.endings)
+                for form, ended, seen in found:
+                    table = batch.endings if ended else batch
+                    if not len(table):
+                        assert seen is None
                         continue
-                    assert table.packed is not None
-                    reader = readers.setdefault(type(table), SingleRow(env.sizes, table.packed.before))
-                    row = table.packed.columns
-                    np.testing.assert_array_equal(reader.table(row), features.table_of(table)[0])
-                    np.testing.assert_array_equal(reader.mask(row), table.masks[0])
-                    assert (reader.reward(row), reader.seat(row)) == (table.rewards[0], table.seats[0])
-                    kinds |= 1 << int(table.kinds[0])
-                    if isinstance(table, Batch):
-                        assert (reader.attempts(row), reader.kind(row)) == (table.attempts[0], table.kinds[0])
+                    assert seen is not None
+                    compute = FORMS[form]
+                    if compute is None:
+                        assert seen.observation is None
+                    else:
+                        np.testing.assert_array_equal(seen.observation, compute(table)[0])
+                    np.testing.assert_array_equal(seen.mask, table.masks[0])
+                    attempts = batch.attempts[0] if table is batch else 0
+                    assert seen[2:] == (table.rewards[0], table.seats[0], table.kinds[0], attempts)
+                    kinds |= 1 << seen.kind
                 ends += len(batch.endings)
     assert ends > 10
     # Ends, turns and exchanges; in the default game also special actions.
@@ -48,23 +55,28 @@ def test_rows_are_those_of_the_columns(rules: Any) -> None:
     assert kinds & wanted == wanted
 
 
-def test_a_number_that_is_too_large_is_not_looked_up() -> None:
+def test_a_row_is_read_while_no_column_has_been_used() -> None:
     with VectorEnv(seed=1) as env:
-        packed = env.batch.packed
-        assert packed is not None
-        reader = SingleRow(env.sizes, packed.before)
-        row = packed.columns.copy()
-        row[packed.before["pizzas"]] = 255
-        assert reader.table(row) is not None
-        row[packed.before["pizzas"] + 1] = 1
-        assert reader.table(row) is None
+        assert env.batch.first("table", ended=False) is not None
+        assert env.batch.first("table", ended=True) is None
+        assert len(env.batch.games) == 1
+        assert env.batch.first("table", ended=False) is None
+
+
+class ByColumns(Form):
+    """Observations of batches whose columns have been used."""
+
+    def first(self, batch: Batch, *, ended: bool = False) -> Situation:
+        assert len(batch.games) == len(batch)
+        assert len(batch.endings.games) == batch.ended
+        return super().first(batch, ended=ended)
 
 
 @pytest.mark.parametrize("observation", ["table", "columns", "classic"])
 def test_steps_are_those_of_an_environment_without_rows(observation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     options: Any = {"observation": observation, "rewards": "winning", "seed": 8}
     with monkeypatch.context() as patched:
-        patched.setattr("chefshat.envs.single.SingleRow", lambda *_: None)
+        patched.setattr("chefshat.envs.gymnasium_env.Form", ByColumns)
         plain = ChefsHatEnv(**options)
     env = ChefsHatEnv(**options)
     chance = np.random.default_rng(1)
@@ -87,7 +99,7 @@ def test_turns_of_all_seats_are_those_of_an_environment_without_rows(observation
 
     options: Any = {"observation": observation, "rewards": "winning", "invalid_penalty": 0.5, "seed": 8}
     with monkeypatch.context() as patched:
-        patched.setattr("chefshat.envs.single.SingleRow", lambda *_: None)
+        patched.setattr("chefshat.envs.chefshat_v1.Form", ByColumns)
         plain = chefshat_v1.raw_env(**options)
     env = chefshat_v1.raw_env(**options)
     chance = np.random.default_rng(1)

@@ -4,8 +4,11 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use chefshat_simulation::vector::{Batch as Columns, ObservationColumns, VectorSetup};
+use chefshat_agents::table_features;
+use chefshat_engine::RuleSet;
+use chefshat_simulation::vector::{Batch as Columns, ObservationColumns, VectorSetup, kind_number};
 use numpy::{PyArray1, PyArrayMethods as _};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -14,6 +17,17 @@ type Named<T> = Vec<(&'static str, T)>;
 
 /// The number of a table's rows, and its columns one after the other.
 type Table<'py> = (u32, Bound<'py, PyArray1<u8>>);
+
+/// What an environment of one game shows of a row: the observation, the mask as numbers, the reward,
+/// the seat, the kind of the decision and the invalid attempts.
+type Situation<'py> = (
+    Option<Bound<'py, PyArray1<f32>>>,
+    Bound<'py, PyArray1<i8>>,
+    f32,
+    usize,
+    u8,
+    u32,
+);
 
 /// The record of a game that ended.
 #[derive(Debug)]
@@ -76,7 +90,11 @@ pub(crate) struct Batch {
     /// Whether all games are over and none follows.
     #[pyo3(get)]
     done: bool,
+    /// Number of episodes that have ended.
+    #[pyo3(get)]
+    ended: u32,
     statistics: bool,
+    rules: RuleSet,
     columns: Mutex<Columns>,
     records: Vec<Record>,
 }
@@ -86,6 +104,43 @@ impl Batch {
     /// Hands over the open decisions. Every table is handed over once.
     fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Table<'py>> {
         packed(py, self.rows, decisions(&mut self.columns()))
+    }
+
+    /// The first open decision, or the end of the first episode if `ended`; `None` without rows, and
+    /// once its table has been handed over. `form`: "table" or "classic" for that observation.
+    #[pyo3(signature = (form, ended))]
+    fn first<'py>(
+        &self,
+        py: Python<'py>,
+        form: Option<&str>,
+        ended: bool,
+    ) -> PyResult<Option<Situation<'py>>> {
+        let columns = self.columns();
+        let seen = match ended {
+            false => columns.situation(0, &self.rules),
+            true => columns.endings.situation(0, &self.rules),
+        };
+        let Some(seen) = seen else {
+            return Ok(None);
+        };
+        let observation = match form {
+            None => None,
+            Some("table") => Some(table_features(&seen.observation, &seen.legal)),
+            Some("classic") => Some(seen.observation.classic_vector(&seen.legal)),
+            Some(_) => return Err(PyValueError::new_err("a form is table or classic")),
+        };
+        let mut mask = vec![0; usize::from(self.rules.actions().size())];
+        for action in seen.legal.iter() {
+            mask[usize::from(action.index())] = 1;
+        }
+        Ok(Some((
+            observation.map(|values| PyArray1::from_vec(py, values)),
+            PyArray1::from_vec(py, mask),
+            seen.reward,
+            seen.observation.seat.unwrap_or_default().index(),
+            seen.observation.kind.map_or(0, kind_number),
+            seen.attempts,
+        )))
     }
 
     /// Hands over the episodes that have ended.
@@ -139,6 +194,8 @@ impl Batch {
             step: columns.step,
             rows: columns.rows,
             done: columns.done,
+            ended: columns.endings.rows,
+            rules: *setup.rules(),
             statistics: setup.statistics(),
             columns: Mutex::new(columns),
             records,

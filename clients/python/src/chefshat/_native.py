@@ -5,7 +5,7 @@ import importlib.metadata
 import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NoReturn, TypeVar, cast
+from typing import Any, Literal, NoReturn, TypeVar, cast
 
 import chefshat_native
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from chefshat import pb
 from chefshat._games import checked
 from chefshat.address import ServerAddress
-from chefshat.batch import Batch, GameRecord
+from chefshat.batch import Batch, GameRecord, Situation
 from chefshat.columns import Beginnings, Endings, Packed, ShiftStatistics, Sizes, Table, Totals
 from chefshat.errors import ChefsHatError
 
@@ -66,6 +66,16 @@ class NativeBatch(Batch):
         self._layouts = layouts
         # Tables without rows, which all batches of the games share.
         self._empty = empty
+
+    @property
+    def ended(self) -> int:
+        """Number of episodes of the client's seats that have ended."""
+        return self._native.ended
+
+    def first(self, form: Literal["table", "classic"] | None, *, ended: bool) -> Situation | None:
+        """Returns the first open decision, or the end of the first episode; None once a column of its table has been used."""
+        seen = self._native.first(form, ended)
+        return None if seen is None else Situation(*seen)
 
     @classmethod
     def of(cls, rows: int, sizes: Sizes, columns: Mapping[str, Any]) -> Batch:  # type: ignore[override] # Arrays are not the engine's.

@@ -6,9 +6,10 @@ Columns are in `columns`; the stream of batches is in `vector`.
 import os
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.columns import Beginnings, Column, Endings, ShiftStatistics, Situations, Sizes, Totals
@@ -36,6 +37,26 @@ class GameRecord:
         Raises `OSError` if it cannot be written.
         """
         write_record(path, self.lines)
+
+
+class Situation(NamedTuple):
+    """What an environment of one game shows of a row.
+
+    Attributes:
+        observation: of the form asked for.
+        mask: (A,): 1 where an action is legal; zeros at an end.
+        reward: the reward.
+        seat: the seat.
+        kind: the kind of the decision; 0 at an end.
+        attempts: the invalid attempts at the decision; 0 at an end.
+    """
+
+    observation: Any
+    mask: NDArray[np.int8]
+    reward: float
+    seat: int
+    kind: int
+    attempts: int
 
 
 class Content(Protocol):
@@ -116,6 +137,24 @@ class Batch(Situations):
         self.step = content.step
         #: Whether all games are over and no other follows; only a reset with a seed starts new ones.
         self.done = content.done
+
+    @property
+    def ended(self) -> int:
+        """Number of episodes of the client's seats that have ended."""
+        return len(self.endings)
+
+    def first(self, form: Literal["table", "classic"] | None, *, ended: bool) -> Situation | None:
+        """Returns the first open decision, or the end of the first episode, of games in this process.
+
+        What makes one game fast: reading one number through a column costs as much as a step of the game.
+
+        Args:
+            form: the observation it has; None: none.
+            ended: the end of an episode.
+
+        Returns:
+            None for games on a server, and once a column of the table has been used, for instance by a reward function.
+        """
 
     @cached_property
     def endings(self) -> Endings:

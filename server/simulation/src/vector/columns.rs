@@ -565,7 +565,8 @@ pub(super) fn places_taken(
     places
 }
 
-const fn kind_number(kind: DecisionKind) -> u8 {
+/// The number of a kind of decision in columns.
+pub const fn kind_number(kind: DecisionKind) -> u8 {
     match kind {
         DecisionKind::Turn => 1,
         DecisionKind::Exchange => 2,

@@ -1,7 +1,8 @@
 //! Vector environments: many games of one client, stepped together. A step takes one action for
 //! each open decision of the client, advances all games with built-in agents, and returns the next
 //! open decisions as columns. `setup` has the options, `slot` advances one game, `blocks` all of
-//! them, `columns` is the output, `saved` has complete states of games, `seen` what a seat knows there.
+//! them, `columns` is the output, `situation` reads a row of it, `saved` has complete states of games,
+//! `seen` what a seat knows there.
 //!
 //! A state is everything that determines how a game continues. It can be kept as a value or as
 //! bytes, restored here or elsewhere, and forked:
@@ -32,6 +33,7 @@ mod sampling;
 mod saved;
 mod seen;
 mod setup;
+mod situation;
 mod slot;
 mod start;
 mod terms;
@@ -42,7 +44,9 @@ use std::sync::Arc;
 use chefshat_engine::ActionId;
 use rayon::ThreadPool;
 
-pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
+pub use columns::{
+    Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals, kind_number,
+};
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
 pub use history::MAX_HISTORY;
 pub use opponent::Opponent;
@@ -50,6 +54,7 @@ use part::{OpenRow, Part};
 pub use saved::SavedGame;
 pub use seen::SeenShift;
 pub use setup::{Episode, VectorSetup};
+pub use situation::Situation;
 use slot::Slot;
 pub use start::{Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};

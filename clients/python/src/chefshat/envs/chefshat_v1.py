@@ -4,7 +4,7 @@ One seat against built-in agents is in `gymnasium_env`. Seats decide in turn, so
 """
 
 import copy
-from typing import Any, ClassVar, Unpack
+from typing import Any, ClassVar, Unpack, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -25,7 +25,6 @@ from chefshat.envs.illegal import with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
 from chefshat.envs.options import AllSeatsOptions, EnvOptions
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
-from chefshat.envs.single import RowReader
 from chefshat.learn import features
 from chefshat.vector import Batch, VectorEnv
 
@@ -33,9 +32,19 @@ __all__ = ["env", "raw_env"]
 
 
 def env(address: str | ServerAddress | None = None, **options: Unpack[AllSeatsOptions]) -> "AECEnv[str, Any, Any]":
-    """Creates the environment with PettingZoo's checks of the order of calls and of actions. Arguments: see `raw_env`."""
-    checked: AECEnv[str, Any, Any] = wrappers.AssertOutOfBoundsWrapper(raw_env(address, **options))
-    return wrappers.OrderEnforcingWrapper(checked)
+    """Creates the environment with PettingZoo's checks of the order of calls. Arguments: see `raw_env`, which checks actions."""
+    return _InOrder(raw_env(address, **options))
+
+
+class _InOrder(wrappers.OrderEnforcingWrapper):  # type: ignore[misc]  # PettingZoo has no types.
+    """PettingZoo's checks of the order of calls. Asks the environment once for what an agent sees, not for each part of it."""
+
+    def last(self, observe: bool = True) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        last = self.env.last if self._has_reset else super().last
+        return cast(tuple[Any, float, bool, bool, dict[str, Any]], last(observe))
+
+    def __str__(self) -> str:
+        return str(self.env)
 
 
 class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types.
@@ -93,7 +102,6 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         self._action_spaces: dict[str, spaces.Space[Any]] = {
             agent: spaces.Discrete(sizes.num_actions) for agent in self.possible_agents
         }
-        self._reader = RowReader(self._form, self.vector.batch, own_rewards="reward_function" in options)
         self._nothing = self._form.of(Situations(1, sizes))
         self._no_mask = np.zeros(sizes.num_actions, np.int8)
         self._seen: dict[str, Any] = {}
@@ -154,7 +162,7 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         self._stepped = True
         self._cumulative_rewards[agent] = 0.0
         self._clear_rewards()
-        if len(batch.endings):
+        if batch.ended:
             self._end(batch)
         else:
             reward = self._take_turn(batch)
@@ -181,7 +189,7 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
 
     def _take_turn(self, batch: Batch) -> float:
         """Selects the deciding agent. Returns its rewards since its last decision."""
-        observation, self._mask, reward, seat, kind, attempts = self._reader.read(batch)
+        observation, self._mask, reward, seat, kind, attempts = self._form.first(batch)
         agent = self.possible_agents[seat]
         self.agent_selection = agent
         if batch.sizes.has_all_hands:

@@ -17,7 +17,6 @@ from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.options import EnvOptions
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
-from chefshat.envs.single import RowReader
 from chefshat.errors import ChefsHatError
 from chefshat.vector import Batch, VectorEnv
 
@@ -30,7 +29,7 @@ def take(vector: VectorEnv, action: Any, invalid_penalty: float) -> tuple[Batch,
     actions = np.asarray([action])
     penalty = float(penalties(vector.batch, actions, invalid_penalty)[0]) if invalid_penalty else 0.0
     batch = vector.step(actions)
-    if not len(batch) and not len(batch.endings):
+    if not len(batch) and not batch.ended:
         wait_for_a_row(vector, or_an_end=True)
         batch = vector.batch
     return batch, penalty
@@ -42,7 +41,7 @@ def wait_for_a_row(vector: VectorEnv, *, or_an_end: bool = False) -> None:
     Raises:
         ChefsHatError: the games are over.
     """
-    while len(vector.batch) == 0 and not (or_an_end and len(vector.batch.endings) > 0):
+    while len(vector.batch) == 0 and not (or_an_end and vector.batch.ended > 0):
         if vector.batch.done:
             raise ChefsHatError("GAMES_OVER", "all total_games games are over; leave total_games out, or reset with a seed")
         vector.step(np.zeros(0, np.uint16))
@@ -109,7 +108,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         self.observation_space = self._form.space_with_mask
         #: The seat's current situation, in row 0.
         self._now: Batch | Endings = self.vector.batch
-        self._reader = RowReader(self._form, self.vector.batch, own_rewards="reward_function" in options)
+        self._mask = np.zeros(sizes.num_actions, np.int8)
         # Whether an episode has begun, and whether a step has been taken in it.
         self._running = False
         self._stepped = False
@@ -133,7 +132,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         self._now = self.vector.batch
         if self.render_mode == "human":
             self.render()
-        observed, _, info = self._read(self._now)
+        observed, _, info = self._read(self.vector.batch)
         return observed, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:  # noqa: ANN401 - As Gymnasium has it.
@@ -143,16 +142,15 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
             raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
         batch, penalty = take(self.vector, action, self._invalid_penalty)
         self._stepped = True
-        endings = batch.endings
-        if not len(endings):
+        if not batch.ended:
             self._now = batch
             observed, reward, info = self._read(batch)
             terminated = truncated = False
         else:
             # The seat had no decision in further ones.
-            self._now = endings
             self._running = False
-            observed, reward, info = self._read(endings)
+            observed, reward, info = self._read(batch, ended=True)
+            self._now = endings = batch.endings
             truncated = bool(endings.truncated[0])
             terminated = not truncated
             info["place"] = int(endings.places_taken[0])
@@ -162,7 +160,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns whether each of the A actions is legal now."""
-        return np.array(self._now.masks[0], np.bool_)
+        return self._mask.astype(np.bool_)
 
     def render(self) -> str | None:
         """Formats the seat's situation as text: returned with "ansi", printed with "human"."""
@@ -179,9 +177,10 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         """Ends the game."""
         self.vector.close()
 
-    def _read(self, now: Batch | Endings) -> tuple[Any, float, dict[str, Any]]:
-        """Returns the observation, the reward and the info of the first row."""
-        observation, mask, reward, _, kind, attempts = self._reader.read(now)
+    def _read(self, batch: Batch, *, ended: bool = False) -> tuple[Any, float, dict[str, Any]]:
+        """Returns the observation, the reward and the info at the open decision, or at the end of the episode."""
+        observation, mask, reward, _, kind, attempts = self._form.first(batch, ended=ended)
+        self._mask = mask
         if self._form.has_parts:
             observation["action_mask"] = mask.copy()
-        return observation, reward, {"action_mask": mask, "kind": kind, "invalid_attempts": attempts}
+        return observation, reward, {"action_mask": mask.copy(), "kind": kind, "invalid_attempts": attempts}

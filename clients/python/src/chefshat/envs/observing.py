@@ -5,13 +5,14 @@ its interface.
 """
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from chefshat.columns import Column, Observations, Situations, Sizes
+from chefshat.batch import Batch, Situation
+from chefshat.columns import Column, Endings, Observations, Situations, Sizes
 from chefshat.learn import features
 
 ObservationFunction: TypeAlias = Callable[[Situations], NDArray[Any]]
@@ -50,17 +51,19 @@ class Form:
             sample: some situations, to determine the space of a function.
         """
         self._function: ObservationFunction | None = None
+        # What the engine computes itself for a single row.
+        self._known: Literal["table", "classic"] | None = None
         self.has_parts = observation == "columns"
         self.is_table = observation == "table"
         if callable(observation):
             self._function = observation
             self.space = _space_of(np.asarray(observation(sample)), len(sample))
         elif observation == "classic":
-            self._function = features.classic_of
+            self._function, self._known = features.classic_of, "classic"
             width = features.classic_width(sizes.faces, sizes.hand_size)
             self.space = spaces.Box(0.0, 1.0, (width,), np.float32)
         elif observation == "table":
-            self._function = features.table_of
+            self._function, self._known = features.table_of, "table"
             # A play of all F cards of face F with both jokers exceeds 1.
             self.space = spaces.Box(0.0, 2.0, (features.table_width(sizes.players, sizes.faces),), np.float32)
         elif observation == "columns":
@@ -79,6 +82,19 @@ class Form:
         seen = situations.observations
         found = {name: getattr(situations if name in _DECISION else seen, name) for name in _columns(situations.sizes)}
         return {name: array.reshape(len(situations), -1) for name, array in found.items()}
+
+    def first(self, batch: Batch, *, ended: bool = False) -> Situation:
+        """Returns the first open decision of a batch, or the end of its first episode."""
+        seen = batch.first(self._known, ended=ended)
+        if seen is not None and self._known is not None:
+            return seen
+        now: Batch | Endings = batch.endings if ended else batch
+        observation = self.row(self.of(now), 0)
+        if seen is not None:
+            return seen._replace(observation=observation)
+        attempts = int(now.attempts[0]) if isinstance(now, Batch) else 0
+        mask = np.array(now.masks[0], np.int8)
+        return Situation(observation, mask, float(now.rewards[0]), int(now.seats[0]), int(now.kinds[0]), attempts)
 
     def row(self, observed: Observed, row: int) -> Any:  # noqa: ANN401 - An array or a dictionary of them.
         """Returns a copy of one observation."""

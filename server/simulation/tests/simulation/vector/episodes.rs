@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, game_seed};
-use chefshat_engine::{ActionId, Game, RewardScheme, RuleSetSpec, Stop, Viewer};
+use chefshat_engine::{ActionId, Game, RewardScheme, RuleSetSpec, Seat, Stop, Viewer};
 use chefshat_simulation::vector::{
-    Episode, InvalidActions, Seeds, Start, VectorGames, VectorSetup,
+    Episode, InvalidActions, Seeds, Situation, Start, VectorGames, VectorSetup,
 };
 
 use super::*;
@@ -96,47 +96,22 @@ fn an_episode_ends_for_every_seat_with_its_final_observation() {
     for shifts in [1, 2] {
         let setup = setup(shifts).with_total_games(NonZeroU64::new(3)).unwrap();
         let (mut games, mut batch) = VectorGames::new(setup);
-        let mut first: BTreeMap<u32, String> = BTreeMap::new();
+        let mut first: BTreeMap<u32, Vec<(Situation, u8)>> = BTreeMap::new();
         while first.len() < 3 {
             batch = games.step(&some_actions(&batch)).unwrap();
             let ended = &batch.endings;
             assert_eq!(ended.rows % 4, 0, "one row for each seat");
             for (row, game) in u32s(&ended.games).into_iter().enumerate() {
-                let part = |column: &[u8], width: usize| column[row * width..][..width].to_vec();
-                let seen = &ended.observations;
+                let rules = spec(shifts).validate().unwrap();
+                let seen = ended.situation(row, &rules).unwrap();
                 let place = ended.places_taken[row];
-                let view = format!(
-                    "{:?}",
-                    (
-                        (
-                            ended.seats[row],
-                            ended.ends[row],
-                            place,
-                            part(&ended.rewards, 4)
-                        ),
-                        (
-                            part(&seen.hands, 12),
-                            seen.golden[row],
-                            part(&seen.boards, 3)
-                        ),
-                        (
-                            part(&seen.cards_left, 4),
-                            part(&seen.passed, 4),
-                            part(&seen.places, 4)
-                        ),
-                        (
-                            part(&seen.points, 16),
-                            part(&seen.played, 12),
-                            part(&seen.shifts, 4)
-                        ),
-                        part(&seen.pizzas, 4),
-                    )
-                );
                 assert_eq!(ended.game_over[row], u8::from(shifts == 1));
-                assert_eq!(part(&seen.places, 4)[usize::from(ended.seats[row])], place);
-                let points = u32s(&part(&seen.points, 16))[usize::from(ended.seats[row])];
+                let seat = Seat::new(usize::from(ended.seats[row]));
+                assert_eq!(seen.observation.seat, Some(seat));
+                assert_eq!(seen.observation.places[seat], place);
+                let points = seen.observation.points[seat];
                 assert_eq!(points, [5, 3, 1, 0][usize::from(place) - 1]);
-                first.entry(game).or_default().push_str(&view);
+                first.entry(game).or_default().push((seen, ended.ends[row]));
             }
         }
         endings.push(first);

@@ -6,9 +6,11 @@ use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed};
 use chefshat_engine::{
-    ActionId, Decision, DecisionKind, Game, Mask, RewardScheme, Script, Seat, Viewer,
+    ActionId, Cards, Decision, DecisionKind, Game, Observation, RewardScheme, Script, Seat, Viewer,
 };
-use chefshat_simulation::vector::{LEAVE_OPEN, Seeds, Start, StepError, VectorGames, VectorSetup};
+use chefshat_simulation::vector::{
+    LEAVE_OPEN, Seeds, Situation, Start, StepError, VectorGames, VectorSetup,
+};
 
 use super::*;
 
@@ -25,9 +27,8 @@ fn every_game_equals_the_same_game_played_alone() {
     .with_total_games(NonZeroU64::new(23))
     .unwrap()
     .with_records(true);
-    // Mask, hand, cards left and action of each decision, by game.
-    type Shown = (Mask, Vec<u8>, Vec<u8>, ActionId);
-    let mut rows: BTreeMap<u64, Vec<Shown>> = BTreeMap::new();
+    // Each decision and its action, by game.
+    let mut rows: BTreeMap<u64, Vec<(Situation, ActionId)>> = BTreeMap::new();
     let mut indices: BTreeMap<u32, u64> = BTreeMap::new();
     let played = play_out(setup, |_, batch| {
         for (game, index) in u32s(&batch.beginnings.games)
@@ -37,14 +38,13 @@ fn every_game_equals_the_same_game_played_alone() {
             indices.insert(game, index);
         }
         let actions = some_actions(batch);
-        for (row, (game, mask)) in u32s(&batch.games).iter().zip(masks(batch)).enumerate() {
-            let part = |column: &[u8], width: usize| column[row * width..][..width].to_vec();
-            let hand = part(&batch.observations.hands, 12);
-            let left = part(&batch.observations.cards_left, 4);
+        for (row, game) in u32s(&batch.games).iter().enumerate() {
+            let situation = batch.situation(row, &rules()).unwrap();
             rows.entry(indices[game])
                 .or_default()
-                .push((mask, hand, left, actions[row]));
+                .push((situation, actions[row]));
         }
+        assert_eq!(batch.situation(actions.len(), &rules()), None);
     });
     let mut found: Vec<u64> = played.iter().map(|game| game.index).collect();
     found.sort_unstable();
@@ -60,11 +60,9 @@ fn every_game_equals_the_same_game_played_alone() {
                 assert!(!alone.legal_actions().contains(*attempt));
             }
             if open.seat == Seat::new(0) {
-                let (mask, hand, left, action) = seen.next().unwrap();
-                let view = alone.observe(Viewer::Seat(open.seat));
-                assert_eq!(*mask, alone.legal_actions());
-                assert!(view.hand.counts(11).eq(hand.iter().copied()));
-                assert_eq!(view.cards_left.as_slice(), left);
+                let (situation, action) = seen.next().unwrap();
+                assert_eq!(situation.legal, alone.legal_actions());
+                assert_eq!(situation.observation, in_columns(&alone, open.seat));
                 assert_eq!(*action, taken.action);
             }
             alone.apply(taken.action, |_| {}).unwrap();
@@ -73,6 +71,19 @@ fn every_game_equals_the_same_game_played_alone() {
     }
     let wrong = played.iter().flat_map(|game| &game.decisions);
     assert!(wrong.map(|taken| taken.attempts.len()).sum::<usize>() > 1000);
+}
+
+/// What a seat may know, as far as columns have it: which exchanged card is the Golden card they do
+/// not say.
+fn in_columns(game: &Game, seat: Seat) -> Observation {
+    let seen = game.observe(Viewer::Seat(seat));
+    let counts =
+        |cards: Cards| Cards::from_counts(11, &cards.count_array(11)[..12], false).unwrap();
+    Observation {
+        gave: counts(seen.gave),
+        received: counts(seen.received),
+        ..seen
+    }
 }
 
 #[test]
