@@ -44,6 +44,21 @@ test("a lost stream is reopened until it ends", async () => {
   expect(following.link.value).toBe("ended");
 });
 
+test("a stream that ends is not reopened if the server had nothing more to send", async () => {
+  let opened = 0;
+  const heard: string[] = [];
+  const following = follow(
+    () => {
+      opened += 1;
+      return stream(["a", "b"]);
+    },
+    (message) => heard.push(message) > 0,
+    () => heard.length === 2,
+  );
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect([opened, heard, following.link.value]).toEqual([1, ["a", "b"], "ended"]);
+});
+
 test("an error that a retry does not fix ends the stream", async () => {
   let opened = 0;
   const following = follow(

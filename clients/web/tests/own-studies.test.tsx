@@ -28,6 +28,7 @@ import {
   DeleteStudyParticipantResponseSchema,
   DeleteStudyResponseSchema,
   ExportStudyResponseSchema,
+  FollowStudyResponseSchema,
   ListStudiesResponseSchema,
   ListStudyLinksResponseSchema,
   RemoveStudyParticipantResponseSchema,
@@ -39,7 +40,7 @@ import { forgetAll } from "../src/store";
 import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
-import { OwnStudy } from "../src/studies/OwnStudyPage";
+import { OwnStudy, OwnStudyPage } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
 import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files";
 import { StudiesPage } from "../src/studies/StudiesPage";
@@ -70,6 +71,7 @@ const participants = [
   participant(2, StudyParticipantState.ACTIVE, ["B"]),
   participant(3, StudyParticipantState.INVITED, []),
 ];
+const changed = vi.fn<(participant: StudyParticipant) => void>();
 const button = (words: string) =>
   [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
 const press = async (words: string) => {
@@ -305,7 +307,7 @@ test("those of a study with groups may be added together, in whole groups", asyn
     participant(1, StudyParticipantState.LEFT_OVER, []),
     create(StudyParticipantSchema, { number: 2, pseudonym: "P02", state: StudyParticipantState.ACTIVE, group: 7 }),
   ];
-  await act(() => render(<OwnStudy study={inPairs} participants={paired} />, root));
+  await act(() => render(<OwnStudy study={inPairs} participants={paired} onChanged={changed} />, root));
   expect(root.querySelector('[data-part="conditions"]')?.textContent).toContain("left over");
   expect(root.querySelector('[data-part="participants"]')?.textContent).toContain("group 7");
   const form = root.querySelector('[data-part="add-participants"]');
@@ -336,7 +338,7 @@ test("the settings of a study make a file that gives the same ones", async () =>
 test("the device that a study needs is said", async () => {
   const settings = { participants: 8, device: { pointer: StudyPointer.FINE, minWidth: 1024 } };
   const needing = create(StudySchema, { studyId: ID, settings });
-  await act(() => render(<OwnStudy study={needing} participants={[]} />, root));
+  await act(() => render(<OwnStudy study={needing} participants={[]} onChanged={changed} />, root));
   expect(root.textContent).toContain(
     "Device that participants need: computer. Least width of the page, in pixels: 1024",
   );
@@ -444,7 +446,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   const erase = vi
     .spyOn(studyApi, "deleteStudyParticipant")
     .mockResolvedValue(create(DeleteStudyParticipantResponseSchema));
-  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
   expect(root.textContent).toContain("1 of 8 completed");
   const rows = [...root.querySelectorAll('[data-part="participants"] tbody tr')];
   expect(rows.map((row) => row.querySelectorAll("td")[2]?.textContent)).toEqual([
@@ -487,7 +489,7 @@ test("a study is deleted after a confirmation, and this device forgets its key",
   keepOwnerToken(OTHER, OTHER_TOKEN);
   navigate({ page: "ownStudy", studyId: ID });
   const erase = vi.spyOn(studyApi, "deleteStudy").mockResolvedValue(create(DeleteStudyResponseSchema));
-  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
   await press("Delete the study…");
   expect(root.querySelector('[data-part="question"]')?.textContent).toMatch(/cannot be restored/);
   await press("Cancel");
@@ -510,7 +512,7 @@ test("participants in the middle of a study are removed only after the server ha
     if (!force) throw refused("STUDY_RUNNING");
     return create(DeleteStudyResponseSchema);
   });
-  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
   expect(button("Remove the participants and delete…")).toBeUndefined();
   await press("Delete the study…");
   await press("Delete everything now");
@@ -528,12 +530,72 @@ test("participants in the middle of a study are removed only after the server ha
 test("a study that cannot be deleted stays, and says why", async () => {
   keepOwnerToken(ID, TOKEN);
   vi.spyOn(studyApi, "deleteStudy").mockRejectedValue(refused("STORE_FAILED", Code.Unavailable));
-  await act(() => render(<OwnStudy study={study} participants={participants} />, root));
+  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
   await press("Delete the study…");
   await press("Delete everything now");
   expect(root.querySelector('[role="alert"]')).not.toBeNull();
   expect(button("Remove the participants and delete…")).toBeUndefined();
   expect(ownerTokenOf(ID)).toBe(TOKEN);
+});
+
+test("a form with wrong fields says so beside its button, and goes to the first of them each time", async () => {
+  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
+  await act(() => render(<NewStudyPage />, root));
+  await settle();
+  const form = root.querySelector('[data-part="study-form"]');
+  expect(form?.querySelector('[role="alert"]')).toBeNull();
+  for (const _ of [1, 2]) {
+    await act(() => root.querySelector<HTMLElement>('[data-part="study-form"] button[type="submit"]')?.focus());
+    await press("Create the study");
+    expect(form?.textContent).toContain("Some fields need correcting");
+    expect(document.activeElement).toBe(form?.querySelector('[aria-invalid="true"]'));
+  }
+});
+
+test("a closed study is shown whole, and a deletion in it as soon as it is done", async () => {
+  const key = ID + "ab".repeat(32);
+  keepOwnerToken(ID, key);
+  const closed = create(StudySchema, { ...study, closed: true, active: 0 });
+  const follow = vi.spyOn(studyApi, "followStudy").mockImplementation(async function* () {
+    yield create(FollowStudyResponseSchema, { study: closed, participants: participants.slice(0, 2) });
+    yield create(FollowStudyResponseSchema, { participants: participants.slice(2) });
+  });
+  const left = create(StudyParticipantSchema, { number: 1, dataDeleted: true });
+  vi.spyOn(studyApi, "deleteStudyParticipant").mockResolvedValue(
+    create(DeleteStudyParticipantResponseSchema, { participant: left }),
+  );
+  await act(() => render(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />, root));
+  await settle();
+  const rows = () => [...root.querySelectorAll('[data-part="participants"] tbody tr')];
+  await eventually(() => expect(rows().length).toBe(3));
+  await press("Delete data");
+  await press("Delete now");
+  await eventually(() => expect(rows()[0]?.textContent).toContain("deleted"));
+  expect(follow).toHaveBeenCalledTimes(1);
+});
+
+test("a key of another study is not taken, and one that the server does not know can be replaced", async () => {
+  const right = ID + "01".repeat(32);
+  keepOwnerToken(ID, TOKEN);
+  vi.spyOn(studyApi, "followStudy").mockImplementation(async function* ({ ownerToken }) {
+    if (ownerToken !== right) throw refused("STUDY_UNKNOWN", Code.NotFound);
+    yield create(FollowStudyResponseSchema, { study: { ...study, closed: true }, participants });
+  });
+  await act(() => render(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />, root));
+  await eventually(() => expect(button("Use this key")).toBeDefined());
+  const enter = (key: string) =>
+    act(() => {
+      const field = root.querySelector("input");
+      if (field) field.value = key;
+      field?.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+  await enter(OTHER_TOKEN);
+  await press("Use this key");
+  expect(ownerTokenOf(ID)).toBe(TOKEN);
+  await enter(` ${right} `);
+  await press("Use this key");
+  expect(ownerTokenOf(ID)).toBe(right);
+  await eventually(() => expect(root.textContent).toContain("Trust 1"));
 });
 
 test("an export that the server ended early is none", async () => {

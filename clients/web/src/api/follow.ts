@@ -39,11 +39,13 @@ export const askHeartbeats: Interceptor = (next) => (request) => {
 
 /**
  * Follows the stream that `open` opens. `onMessage` receives every message and returns whether more
- * will follow. A stream that ends while more should follow is reopened.
+ * will follow. A stream that ends while more should follow is reopened, unless `isComplete` says that
+ * the server had nothing more to send.
  */
 export function follow<Message>(
   open: (signal: AbortSignal) => AsyncIterable<Message>,
   onMessage: (message: Message) => boolean,
+  isComplete: () => boolean = () => false,
 ): Following {
   const link = signal<Link>("connecting");
   const fault = signal<Fault | undefined>(undefined);
@@ -104,6 +106,7 @@ export function follow<Message>(
           link.value = "open";
           if (!handle(message)) return end("ended");
         }
+        if (!stopped && isComplete()) return end("ended");
       } catch (thrown) {
         if (stopped) return;
         const found = faultOf(thrown);

@@ -1,6 +1,6 @@
 // Creating a study: from a file with all settings, or with a form for the common case.
 
-import { useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { agentsFor, useOffered } from "../api/server";
 import type { StudySettings } from "../gen/chefshat/v1/study_pb";
 import { language, languages, t } from "../i18n";
@@ -113,7 +113,13 @@ const DEVICES: readonly StudyForm["device"][] = ["any", "fine", "coarse"];
 function FromForm() {
   const words = t().studies.make;
   const [form, setForm] = useState<StudyForm>(() => emptyForm(language.peek()));
-  const [tried, setTried] = useState(false);
+  // How often the form has been submitted: each time, the first wrong field gets the focus.
+  const [tries, setTries] = useState(0);
+  const tried = tries > 0;
+  const sent = useRef<HTMLFormElement>(null);
+  useLayoutEffect(() => {
+    sent.current?.querySelector<HTMLElement>('[aria-invalid="true"]')?.focus();
+  }, [tries]);
   // Dates of which only a part is entered are empty in the form.
   const [unfinished, setUnfinished] = useState<readonly string[]>([]);
   const [requestId] = useState(newRequestId);
@@ -124,7 +130,7 @@ function FromForm() {
   const change = (changed: Partial<StudyForm>) => setForm((now) => ({ ...now, ...changed }));
   const submit = (event: Event) => {
     event.preventDefault();
-    setTried(true);
+    setTries(tries + 1);
     const typed = event.currentTarget as HTMLFormElement;
     const isUnfinished = (name: string) => (typed.elements.namedItem(name) as HTMLInputElement).validity.badInput;
     const unfinished = DATES.filter(isUnfinished);
@@ -186,7 +192,7 @@ function FromForm() {
     </Field>
   );
   return (
-    <form class={`sheet ${css.part}`} onSubmit={submit} noValidate data-part="study-form">
+    <form ref={sent} class={`sheet ${css.part}`} onSubmit={submit} noValidate data-part="study-form">
       <h2>{words.form}</h2>
       <div class={css.fields}>
         {text("name", words.name, words.nameHint)}
@@ -289,6 +295,9 @@ function FromForm() {
           {text("idParameter", words.idParameter, words.idParameterHint)}
           {PANEL_URLS.map((name) => text(name, words[name], name === "leftUrl" ? "https://…" : words.panelUrlHint))}
         </div>
+      )}
+      {(unfinished.length > 0 || Object.keys(faults).length > 0) && (
+        <Notice kind="fault">{t().lobby.make.lookAgain}</Notice>
       )}
       {fault && <Notice kind="fault">{fault}</Notice>}
       <div>

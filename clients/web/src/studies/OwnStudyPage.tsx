@@ -2,6 +2,7 @@
 // token show it.
 
 import { type Signal, signal } from "@preact/signals";
+import type { ComponentChild } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import { type Following, follow } from "../api/follow";
@@ -39,6 +40,7 @@ import {
   exportStudy,
   keepOwnerToken,
   linksOf,
+  mayOwn,
   ownership,
   ownerTokenOf,
   removeFromStudy,
@@ -49,8 +51,10 @@ import { fileOf } from "./settings-file";
 
 /** The page. */
 export function OwnStudyPage({ route: { studyId } }: PageProps<"ownStudy">) {
-  const [owned, setOwned] = useState(() => ownerTokenOf(studyId) !== null);
-  return owned ? <Owned studyId={studyId} /> : <Unlock studyId={studyId} onKey={() => setOwned(true)} />;
+  // How often a key has been entered: with another one the study is asked for again.
+  const [keys, setKeys] = useState(0);
+  const unlock = <Unlock studyId={studyId} onKey={() => setKeys(keys + 1)} />;
+  return ownerTokenOf(studyId) === null ? unlock : <Owned key={keys} studyId={studyId} unlock={unlock} />;
 }
 
 /** Takes the owner token of a study that another device created. */
@@ -61,7 +65,7 @@ function Unlock({ studyId, onKey }: { studyId: string; onKey: () => void }) {
   const use = (event: Event) => {
     event.preventDefault();
     setTried(true);
-    if (!/^[0-9a-f]{96}$/.test(key.trim())) return;
+    if (!mayOwn(studyId, key.trim())) return;
     keepOwnerToken(studyId, key.trim());
     onKey();
   };
@@ -90,40 +94,78 @@ export interface FollowedStudy {
   readonly participants: readonly StudyParticipant[];
 }
 
-function useStudy(studyId: string): { live: Signal<FollowedStudy | undefined>; following: Following } | undefined {
-  const [followed, setFollowed] = useState<{ live: Signal<FollowedStudy | undefined>; following: Following }>();
+interface StudyFollowing {
+  readonly live: Signal<FollowedStudy | undefined>;
+  readonly following: Following;
+  /** Takes over what is known of participants. */
+  merge(study: Study | undefined, participants: readonly StudyParticipant[]): void;
+}
+
+function useStudy(studyId: string): StudyFollowing | undefined {
+  const [followed, setFollowed] = useState<StudyFollowing>();
   useEffect(() => {
     const live = signal<FollowedStudy | undefined>(undefined);
+    const merge = (study: Study | undefined, participants: readonly StudyParticipant[]) => {
+      const now = live.peek();
+      const next = study ?? now?.study;
+      if (!next) return;
+      const merged = new Map([...(now?.participants ?? []), ...participants].map((one) => [one.number, one]));
+      live.value = {
+        study: next,
+        participants: [...merged.values()].sort((one, other) => one.number - other.number),
+      };
+    };
+    const isOver = () => {
+      const study = live.peek()?.study;
+      return study?.closed === true && study.active === 0;
+    };
     const following = follow(
       (abort) => studyApi.followStudy(ownership(studyId), { signal: abort }),
       ({ study, participants }) => {
-        const now = live.peek();
-        const next = study ?? now?.study;
-        if (!next) return true;
-        const merged = new Map([...(now?.participants ?? []), ...participants].map((one) => [one.number, one]));
-        live.value = {
-          study: next,
-          participants: [...merged.values()].sort((one, other) => one.number - other.number),
-        };
-        return !(next.closed && next.active === 0);
+        merge(study, participants);
+        return true;
       },
+      isOver,
     );
-    setFollowed({ live, following });
+    setFollowed({ live, following, merge });
     return () => following.stop();
   }, [studyId]);
   return followed;
 }
 
-function Owned({ studyId }: { studyId: string }) {
+/** The study, or `unlock` to enter another key if this device's is not that of a study of the server. */
+function Owned({ studyId, unlock }: { studyId: string; unlock: ComponentChild }) {
   const followed = useStudy(studyId);
   const live = followed?.live.value;
-  const fault = followed?.following.link.value === "failed" && followed.following.fault.value;
-  if (fault) return <Notice kind="fault">{wordsOf(fault)}</Notice>;
-  return live ? <OwnStudy {...live} /> : <p class="soft">{t().common.loading}</p>;
+  const link = followed?.following.link.value;
+  const fault = link === "failed" && followed?.following.fault.value;
+  if (fault) {
+    return (
+      <>
+        <Notice kind="fault">{wordsOf(fault)}</Notice>
+        {fault.reason === "STUDY_UNKNOWN" && unlock}
+      </>
+    );
+  }
+  return (
+    <>
+      {link === "lost" && <Notice kind="fault">{t().studies.lost}</Notice>}
+      {live && followed ? (
+        <OwnStudy {...live} onChanged={(participant) => followed.merge(undefined, [participant])} />
+      ) : (
+        <p class="soft">{t().common.loading}</p>
+      )}
+    </>
+  );
+}
+
+interface OwnStudyProps extends FollowedStudy {
+  /** After a call has changed a participant: when the study is over, no stream says so. */
+  onChanged: (participant: StudyParticipant) => void;
 }
 
 /** The page of a study. */
-export function OwnStudy({ study, participants }: FollowedStudy) {
+export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
   const words = t().studies.own;
   const { studyId, settings, closed } = study;
   const deletesAtMs = settings?.deletesAtMs ?? 0n;
@@ -146,7 +188,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
       {!closed && <Add study={study} />}
       <Tests study={study} />
       <Links key={participants.length} studyId={studyId} />
-      <Participants study={study} participants={participants} />
+      <Participants {...{ study, participants, onChanged }} />
       <details class={`sheet ${css.part}`}>
         <summary>{words.showKey}</summary>
         <CopyLine label={words.key} text={ownerTokenOf(studyId) ?? ""} mono />
@@ -445,7 +487,7 @@ function Links({ studyId }: { studyId: string }) {
   );
 }
 
-function Participants({ study, participants }: FollowedStudy) {
+function Participants({ study, participants, onChanged }: OwnStudyProps) {
   const words = t().studies.own.board;
   if (participants.length === 0) return null;
   return (
@@ -469,7 +511,7 @@ function Participants({ study, participants }: FollowedStudy) {
           </thead>
           <tbody>
             {participants.map((participant) => (
-              <Row key={participant.number} study={study} participant={participant} />
+              <Row key={participant.number} {...{ study, participant, onChanged }} />
             ))}
           </tbody>
         </table>
@@ -487,13 +529,21 @@ const LEFT = [
   StudyParticipantState.COMPLETED,
 ];
 
-function Row({ study, participant }: { study: Study; participant: StudyParticipant }) {
+interface RowProps extends Pick<OwnStudyProps, "study" | "onChanged"> {
+  participant: StudyParticipant;
+}
+
+function Row({ study, participant, onChanged }: RowProps) {
   const words = t().studies.own;
   const { number, pseudonym, panelId, state, step, sessions, connected, conditions, group, dataDeleted } = participant;
   const name = pseudonym || `${words.board.number} ${number}`;
   const over = LEFT.includes(state);
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
-  const act = (call: Promise<void>) => call.then(() => false);
+  const act = async (call: Promise<StudyParticipant | undefined>) => {
+    const changed = await call;
+    if (changed) onChanged(changed);
+    return false;
+  };
   return (
     <tr>
       <td class="number">{number}</td>

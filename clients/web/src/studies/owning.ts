@@ -3,7 +3,14 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { CALL_LIMIT_MS } from "../api/client";
-import type { Study, StudyLink, StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
+import { isSecret } from "../api/secrets";
+import type {
+  Study,
+  StudyLink,
+  StudyParticipant,
+  StudySettings,
+  StudySettingsSchema,
+} from "../gen/chefshat/v1/study_pb";
 import { pathOf } from "../router";
 import { recallObject, remember, remembered } from "../store";
 import { studyApi } from "./client";
@@ -15,6 +22,11 @@ const MAX_TOKENS = 100;
 /** The owner token of a study, if this device has it. */
 export function ownerTokenOf(studyId: string): string | null {
   return recallObject(STORED + studyId, ({ ownerToken }) => (typeof ownerToken === "string" ? ownerToken : null));
+}
+
+/** Whether a text may be the owner token of a study: it begins with the study's id. */
+export function mayOwn(studyId: string, text: string): boolean {
+  return isSecret(text) && text.startsWith(studyId);
 }
 
 /** Stores the owner token of a study. */
@@ -68,12 +80,18 @@ export async function linksOf(studyId: string): Promise<StudyLink[]> {
   return (await studyApi.listStudyLinks(ownership(studyId), call)).links;
 }
 
-export async function removeFromStudy(studyId: string, number: number, replace: boolean): Promise<void> {
-  await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace }, call);
+/** Removes a participant, and returns it as it is then. */
+export async function removeFromStudy(
+  studyId: string,
+  number: number,
+  replace: boolean,
+): Promise<StudyParticipant | undefined> {
+  return (await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace }, call)).participant;
 }
 
-export async function deleteDataOf(studyId: string, number: number): Promise<void> {
-  await studyApi.deleteStudyParticipant({ ...ownership(studyId), number }, call);
+/** Deletes the data of a participant, and returns what is left. */
+export async function deleteDataOf(studyId: string, number: number): Promise<StudyParticipant | undefined> {
+  return (await studyApi.deleteStudyParticipant({ ...ownership(studyId), number }, call)).participant;
 }
 
 /** Nobody may begin any more. */

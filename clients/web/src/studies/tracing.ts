@@ -9,6 +9,8 @@ import type { Trace } from "./participating";
 
 /** Interval of sending, milliseconds. */
 const EVERY_MS = 5_000;
+/** How often the rest is sent, if the server cannot be reached. */
+const LAST_TRIES = 6;
 /** Most traces of a call. */
 const MAX_SENT = 500;
 /** Most traces that wait; if the server cannot be reached for long, the oldest are dropped. */
@@ -36,7 +38,8 @@ export function startTracing(
 ): Tracing {
   const sinceMs = performance.now();
   let waiting: Trace[] = [];
-  let sending = false;
+  /** The call under way, if any. */
+  let sending: Promise<void> | undefined;
 
   const add = (kind: StudyTraceKind, target = "", fromMs = performance.now(), durationMs = 0) => {
     const atMs = BigInt(Math.max(0, Math.round(fromMs - sinceMs)));
@@ -44,9 +47,7 @@ export function startTracing(
     waiting.push({ kind, atMs, decisionId, target: target.slice(0, MAX_TARGET), durationMs: Math.round(durationMs) });
     if (waiting.length > MAX_WAITING) waiting = waiting.slice(-MAX_WAITING);
   };
-  const flush = async () => {
-    if (sending || waiting.length === 0) return;
-    sending = true;
+  const sendSome = async () => {
     const batch = waiting.splice(0, MAX_SENT);
     try {
       await send(batch);
@@ -54,10 +55,26 @@ export function startTracing(
       // Tried again with the next batch, unless the server does not want them.
       if (isPassing(faultOf(thrown))) waiting.unshift(...batch);
     } finally {
-      sending = false;
+      sending = undefined;
     }
   };
-  const timer = setInterval(() => void flush(), EVERY_MS);
+  const flush = () => {
+    if (waiting.length > 0) sending ??= sendSome();
+  };
+  /** Sends all that is left. While the server cannot be reached, tries again a few times. */
+  const sendRest = async () => {
+    for (let failures = 0; failures < LAST_TRIES; ) {
+      await sending;
+      const before = waiting.length;
+      if (before === 0) return;
+      flush();
+      await sending;
+      if (waiting.length < before) continue;
+      failures += 1;
+      await new Promise((resolve) => setTimeout(resolve, EVERY_MS));
+    }
+  };
+  const timer = setInterval(flush, EVERY_MS);
 
   /** Something that lasts: it is known when it ends. */
   const spans = (kind: StudyTraceKind, shortestMs: number) => {
@@ -78,7 +95,7 @@ export function startTracing(
     if (left === away) return;
     away = left;
     add(left ? StudyTraceKind.PAGE_LEFT : StudyTraceKind.PAGE_RETURNED);
-    if (left) void flush();
+    if (left) flush();
   };
   const listeners: [EventTarget, string, (event: Event) => void][] = [
     [within, "pointerover", ({ target }) => hover(targetOf(target))],
@@ -107,7 +124,7 @@ export function startTracing(
       clearInterval(timer);
       unwatch();
       for (const [on, name, listener] of listeners) on.removeEventListener(name, listener);
-      void flush();
+      void sendRest();
     },
   };
 }
