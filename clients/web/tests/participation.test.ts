@@ -80,6 +80,29 @@ test("a superseded page stops its requests and does not take the place back", as
   part.stop();
 });
 
+test("after a lost connection the seat is attached again, also if its game has ended meanwhile", async () => {
+  vi.spyOn(roomApi, "getRoom").mockResolvedValue(create(GetRoomResponseSchema, { room: { roomId: "room1" } }));
+  const refusal: Update = { handle: 0, update: { case: "refused", value: { reason: "TICKET_UNKNOWN" } } };
+  let streams = 0;
+  const watch = vi.spyOn(playApi, "watch").mockImplementation(async function* () {
+    streams += 1;
+    const again: Update[] = [refusal, { ...entered, handle: 1 }];
+    for (const update of streams === 1 ? [entered, seated] : again) {
+      yield create(PlayServiceWatchResponseSchema, { updates: [update] });
+      await new Promise((resolve) => setTimeout(resolve, 10));
+    }
+    if (streams === 1) throw away;
+    await new Promise(() => {});
+  });
+  const part = startParticipation("ticket");
+  await vi.advanceTimersByTimeAsync(5_000);
+  const asked = watch.mock.calls.map(([{ seats = [] }]) => seats.map((one) => one.ticket));
+  expect(asked).toEqual([["ticket"], ["t", "ticket"]]);
+  expect(part.presence.value).toBe("here");
+  expect(part.game.value?.live.value.attachment.kind).toBe("refused");
+  part.stop();
+});
+
 test("the request of a room that is gone is not repeated", async () => {
   streaming([
     [0, entered],

@@ -45,8 +45,8 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
     if (game) announce(t().tournaments.part.begins(placeWords(live, game)));
   }, [game]);
   const banner = part && <Banner part={part} />;
-  // The tournament was closed during the game.
-  const gone = part?.presence.value === "over" && game && !isOverThere(game);
+  // The tournament was closed during the game, or the game has ended while the connection was lost.
+  const gone = game && !isOverThere(game) && (part?.presence.value === "over" || isRefused(game));
   if (game && game !== left && !gone) {
     return (
       <Seated
@@ -151,6 +151,11 @@ function GameBanner({ game }: { game: Acting }) {
 function isOverThere(game: Acting): boolean {
   const { phase } = game.live.value.table;
   return phase === "gameOver" || phase === "aborted";
+}
+
+/** Whether the server does not know the seat any more. */
+function isRefused(game: Acting): boolean {
+  return game.live.value.attachment.kind === "refused";
 }
 
 function placeWords({ games }: LiveTournament, game: Acting): string {

@@ -10,9 +10,6 @@ import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Acting, startActing } from "../table/acting";
 import { tableFromRoom } from "../table/model/state";
 
-/** Handles of seats that the server attaches start here. */
-const FIRST_SEATED = 2 ** 31;
-
 /**
  * Delay before a failed request of a room is repeated: the first, and the longest, doubled each
  * time.
@@ -33,8 +30,9 @@ export interface Participation {
   stop(): void;
 }
 
-/** Updates of a seat before its room is known. */
+/** A seat, and its updates before its room is known. */
 interface Seated {
+  readonly ticket: string;
   acting: Acting | undefined;
   waiting: SeatUpdate[];
 }
@@ -68,7 +66,7 @@ export function startParticipation(ticket: string): Participation {
   const seat = (attached: Attached): Seated => {
     const known = rooms.get(attached.roomId);
     if (known) return known;
-    const seated: Seated = { acting: undefined, waiting: [] };
+    const seated: Seated = { ticket: attached.ticket, acting: undefined, waiting: [] };
     rooms.set(attached.roomId, seated);
     const load = async () => {
       const room = await askRoom(attached.roomId);
@@ -92,9 +90,23 @@ export function startParticipation(ticket: string): Participation {
   };
 
   const attach = () => {
-    const handles = new Map<number, Seated>();
+    let handles = new Map<number, Seated>();
+    /** Handle of the participant. */
+    let own = 0;
+    const open = (abort: AbortSignal) => {
+      // The server seats a participant only in games that go on, and this page may not know yet that
+      // one has ended. The participant comes last, so that it is not seated there again.
+      const again = [...rooms.values()].flatMap((seated) => {
+        const { ticket, acting } = seated;
+        if (!acting || hasEnded(acting) || ticket === "") return [];
+        return [{ seated, attach: { ticket, fromSequence: BigInt(acting.live.peek().table.nextSequence) } }];
+      });
+      own = again.length;
+      handles = new Map(again.map(({ seated }, handle) => [handle, seated]));
+      return playApi.watch({ seats: [...again.map(({ attach }) => attach), { ticket }] }, { signal: abort });
+    };
     const receive = (update: SeatUpdate) => {
-      if (update.handle < FIRST_SEATED) {
+      if (update.handle === own) {
         presence.value = presenceAfter(update, presence.peek());
         return;
       }
@@ -104,13 +116,10 @@ export function startParticipation(ticket: string): Participation {
       else seated?.waiting.push(update);
       if (update.update.case === "detached") handles.delete(update.handle);
     };
-    return follow(
-      (abort) => playApi.watch({ seats: [{ ticket }] }, { signal: abort }),
-      ({ updates }) => {
-        batch(() => updates.forEach(receive));
-        return isPresent();
-      },
-    );
+    return follow(open, ({ updates }) => {
+      batch(() => updates.forEach(receive));
+      return isPresent();
+    });
   };
   const following = signal(attach());
 
