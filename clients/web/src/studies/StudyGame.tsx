@@ -12,6 +12,7 @@ import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { inStudy, labelled } from "../table/labels";
 import { tableFromRoom } from "../table/model/state";
+import { SeatBanner } from "../table/SeatBanner";
 import { Seated } from "../table/Seated";
 import { type Session, startSession } from "../table/session";
 import type { Participating } from "./participating";
@@ -94,8 +95,7 @@ function Table({ session, part, label, game, send }: TableProps) {
       started.stop();
     };
   }, [session, send]);
-  const { attachment, substituted, table } = session.live.value;
-  const { link } = session.following.value;
+  const { table } = session.live.value;
   const over = table.phase === "gameOver" || table.phase === "aborted";
   const acting: Session = {
     ...session,
@@ -107,25 +107,7 @@ function Table({ session, part, label, game, send }: TableProps) {
   const banner = (
     <>
       <p class="soft small">{label}</p>
-      {!over && link.value === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
-      {attachment.kind === "refused" && !game.ended && (
-        <Notice kind="fault">
-          {t().table.link.refused} {attachment.message}
-        </Notice>
-      )}
-      {attachment.kind === "superseded" && !over && (
-        <Notice kind="hint">
-          {t().table.link.superseded} <Button onClick={session.takeBack}>{t().table.link.takeBack}</Button>
-        </Notice>
-      )}
-      {substituted && !over && (
-        <Notice kind="hint">
-          {t().table.link.substituted}{" "}
-          <Button look="main" onClick={session.resume}>
-            {t().table.link.resume}
-          </Button>
-        </Notice>
-      )}
+      {!over && !game.ended && <SeatBanner session={session} />}
       {over && !game.ended && <Notice kind="hint">{words.ending}</Notice>}
       {game.ended && (
         <Notice kind="good">

@@ -3,7 +3,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
-import { faultOf, wordsOf } from "../api/faults";
+import { faultOf, isPassing, wordsOf } from "../api/faults";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Again } from "../lobby/Again";
@@ -13,12 +13,11 @@ import { MoveButton, MoveDialog } from "../lobby/MoveToDevice";
 import { RoomInvite } from "../lobby/RoomInvite";
 import { decideSeat, giveUpSeat, type HeldSeat, heldSeat, linkToSeat, seatFromLink } from "../lobby/seat";
 import { WhichOne } from "../lobby/WhichOne";
-import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
-import { Notice } from "../parts/Notice";
 import { Highlights } from "../replay/Highlights";
 import type { PageProps } from "../router";
 import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
+import { SeatBanner } from "./SeatBanner";
 import { Seated } from "./Seated";
 import { type Session, startSession } from "./session";
 
@@ -35,6 +34,10 @@ export function RoomPage({ route }: PageProps<"room">) {
   return <WhichOne {...{ held, brought, decide }} words={t().lobby.moving.which} />;
 }
 
+/** Pause before a failed request is repeated: the first, and the longest, doubled each time. */
+const SHORTEST_WAIT_MS = 1_000;
+const LONGEST_WAIT_MS = 8_000;
+
 /** The room, once it is known which seat of it this device has. */
 function RoomView({ roomId }: { roomId: string }) {
   const [table, setTable] = useState<TableState | undefined>(undefined);
@@ -48,19 +51,25 @@ function RoomView({ roomId }: { roomId: string }) {
     let started: Session | undefined;
     let held: HeldSeat | null = null;
     const load = async () => {
-      try {
-        const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
-        if (left || !room) return;
-        const table = tableFromRoom(room);
-        held = heldSeat(roomId);
-        started = held ? startSession(held, table) : undefined;
-        setTable(table);
-        setSession(started);
-        setHeld(held);
-      } catch (thrown) {
-        const fault = faultOf(thrown);
-        if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
-        if (!left) setFault(wordsOf(fault));
+      for (let waitMs = SHORTEST_WAIT_MS; !left; waitMs = Math.min(2 * waitMs, LONGEST_WAIT_MS)) {
+        try {
+          const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
+          if (left || !room) return;
+          const table = tableFromRoom(room);
+          held = heldSeat(roomId);
+          started = held ? startSession(held, table) : undefined;
+          setFault("");
+          setTable(table);
+          setSession(started);
+          setHeld(held);
+          return;
+        } catch (thrown) {
+          const fault = faultOf(thrown);
+          if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
+          if (!left) setFault(wordsOf(fault));
+          if (!isPassing(fault)) return;
+          await new Promise((resolve) => setTimeout(resolve, Math.max(waitMs, fault.retryMs ?? 0)));
+        }
       }
     };
     setFault("");
@@ -107,11 +116,6 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
   useEffect(() => {
     if (superseded) setMoving(false);
   }, [superseded]);
-  const banner = (
-    <>
-      <Banner session={session} />
-    </>
-  );
   const waiting = table.phase === "waiting";
   const others = table.seats.some((seat) => isTaken(seat) && seat.seat !== own && seat.builtIn === "");
   const move = <MoveButton look={waiting ? "button" : "tool"} onClick={() => setMoving(true)} />;
@@ -132,7 +136,7 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
       {moving && !isOver(table) && <MoveDialog address={linkToSeat(roomId, held)} onClose={() => setMoving(false)} />}
       <Seated
         acting={session}
-        banner={banner}
+        banner={<SeatBanner session={session} />}
         tools={
           !isOver(table) && (
             <>
@@ -166,35 +170,4 @@ function isForAgent(seat: SeatState): boolean {
 
 function isOver({ phase }: TableState): boolean {
   return phase === "gameOver" || phase === "aborted";
-}
-
-/** The state of the connection, if there is something to say. */
-function Banner({ session }: { session: Session }) {
-  const { attachment, substituted, table } = session.live.value;
-  const { link, fault } = session.following.value;
-  const words = t().table.link;
-  if (attachment.kind === "superseded") {
-    return (
-      <Notice kind="hint">
-        {words.superseded} <Button onClick={session.takeBack}>{words.takeBack}</Button>
-      </Notice>
-    );
-  }
-  if (attachment.kind === "refused") {
-    const own = (t().faults.byReason as Record<string, string>)[attachment.reason];
-    return <Notice kind="fault">{own ?? `${words.refused} ${attachment.message}`}</Notice>;
-  }
-  if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
-  if (link.value === "lost") return <Notice kind="fault">{words.lost}</Notice>;
-  if (substituted && table.phase !== "gameOver") {
-    return (
-      <Notice kind="hint">
-        {words.substituted}{" "}
-        <Button look="main" onClick={session.resume}>
-          {words.resume}
-        </Button>
-      </Notice>
-    );
-  }
-  return null;
 }

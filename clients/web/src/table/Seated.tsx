@@ -3,6 +3,8 @@
 // banner.
 
 import type { ComponentChildren } from "preact";
+import { useEffect } from "preact/hooks";
+import { announce } from "../parts/Announcer";
 import { isOn } from "../preferences";
 import { Console, isWizard } from "../wizard/Console";
 import type { Acting } from "./acting";
@@ -34,6 +36,10 @@ export function Seated({ acting, study = false, banner, tools, onward, below, on
   const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);
   useAttention(table.roomId, decision, table.phase !== "gameOver" && table.phase !== "aborted");
+  const trouble = acting.trouble.value;
+  useEffect(() => {
+    if (trouble !== "") announce(trouble);
+  }, [trouble]);
   const autoPassing = useAutoPass(acting, !study && !wizard && !table.physical && isOn("autoPass"));
   if (table.phase === "waiting") {
     return (
@@ -50,7 +56,7 @@ export function Seated({ acting, study = false, banner, tools, onward, below, on
       decision={decision}
       awaited={awaited}
       sending={acting.sending.value}
-      trouble={acting.trouble.value}
+      trouble={trouble}
       banner={banner}
       tools={tools}
       onward={onward}

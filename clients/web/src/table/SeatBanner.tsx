@@ -1,0 +1,38 @@
+// What there is to say of the connection to a seat: in a room, and in a game of a study.
+
+import { wordsOf } from "../api/faults";
+import { t } from "../i18n";
+import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import type { Session } from "./session";
+
+/** The state of the connection, if there is something to say. */
+export function SeatBanner({ session }: { session: Session }) {
+  const { attachment, substituted, table } = session.live.value;
+  const { link, fault } = session.following.value;
+  const words = t().table.link;
+  if (attachment.kind === "superseded") {
+    return (
+      <Notice kind="hint">
+        {words.superseded} <Button onClick={session.takeBack}>{words.takeBack}</Button>
+      </Notice>
+    );
+  }
+  if (attachment.kind === "refused") {
+    const own = (t().faults.byReason as Record<string, string>)[attachment.reason];
+    return <Notice kind="fault">{own ?? `${words.refused} ${attachment.message}`}</Notice>;
+  }
+  if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
+  if (link.value === "lost") return <Notice kind="fault">{words.lost}</Notice>;
+  if (substituted && table.phase !== "gameOver") {
+    return (
+      <Notice kind="hint">
+        {words.substituted}{" "}
+        <Button look="main" onClick={session.resume}>
+          {words.resume}
+        </Button>
+      </Notice>
+    );
+  }
+  return null;
+}
