@@ -3,6 +3,7 @@
 
 import type { ComponentType } from "preact";
 import { useEffect, useErrorBoundary, useLayoutEffect, useState } from "preact/hooks";
+import { reloadsForNewVersion } from "./api/update";
 import { t } from "./i18n";
 import { Button } from "./parts/Button";
 import { ErrorPage } from "./parts/ErrorPage";
@@ -91,28 +92,4 @@ function Guarded({ Page, route }: Shown) {
       </Button>
     </ErrorPage>
   );
-}
-
-/** Key of sessionStorage: when the document was last loaded again for a new version. */
-const RELOADED = "chefshat.reloaded";
-/** Nothing is loaded again so soon after: another version is not what is missing. */
-const ONCE_IN_MS = 60_000;
-
-/**
- * After the code of a page could not be loaded: loads the document again if the server answers, since
- * a new version of the page has other files. Returns whether it does.
- */
-async function reloadsForNewVersion(): Promise<boolean> {
-  try {
-    const before = Number(sessionStorage.getItem(RELOADED));
-    if (Date.now() - before < ONCE_IN_MS) return false;
-    const { ok } = await fetch("/", { method: "HEAD", cache: "no-store" });
-    if (!ok) return false;
-    sessionStorage.setItem(RELOADED, String(Date.now()));
-  } catch {
-    // The server does not answer, or this browser stores nothing and would load again for ever.
-    return false;
-  }
-  location.reload();
-  return true;
 }

@@ -5,7 +5,7 @@ import { render } from "preact";
 import "@fontsource-variable/atkinson-hyperlegible-next/wght.css";
 import "./theme.css";
 import { startToken } from "./api/token";
-import { startUpdates } from "./api/update";
+import { reloadsForNewVersion, startUpdates } from "./api/update";
 import { App } from "./app";
 import { startLanguage } from "./i18n";
 import { startTheme } from "./theme";
@@ -15,9 +15,22 @@ if (root) {
   startToken();
   startTheme();
   startUpdates();
-  await startLanguage();
-  root.replaceChildren();
-  render(<App />, root);
+  try {
+    await startLanguage();
+    root.replaceChildren();
+    render(<App />, root);
+  } catch (thrown) {
+    console.error(thrown);
+    if (!(await reloadsForNewVersion())) notLoaded();
+  }
   // A browser has none in a private window, or without a secure origin.
   void navigator.serviceWorker?.register("/sw.js").catch(() => undefined);
+}
+
+/** Shows what the document says for a page that could not be loaded: without texts, in all languages. */
+function notLoaded(): void {
+  const part = document.getElementById("not-loaded");
+  if (!part) return;
+  part.hidden = false;
+  part.querySelector("button")?.addEventListener("click", () => location.reload());
 }

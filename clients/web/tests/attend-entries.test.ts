@@ -57,15 +57,23 @@ test("what can be entered depends on the moment", () => {
 });
 
 test("a link gives its ticket to another device, and the address loses it", () => {
-  const link = new URL(attendantLink("r1", "s3cret/="));
-  expect(link.pathname).toBe("/rooms/r1/table");
+  const [room, other] = ["ab".repeat(16), "cd".repeat(16)];
+  const ticket = room + "01".repeat(32);
+  const link = new URL(attendantLink(room, ticket));
+  expect(link.pathname).toBe(`/rooms/${room}/table`);
   expect(link.search).toBe("");
-  expect(ticketIn(link.hash)).toBe("s3cret/=");
+  expect(ticketIn(link.hash)).toBe(ticket);
   history.replaceState(null, "", link.pathname + link.hash);
-  expect(takeTicket("r1")).toBe("s3cret/=");
+  expect(takeTicket(room)).toBe(ticket);
   expect(location.hash).toBe("");
-  expect(tableTicket("r1")).toBe("s3cret/=");
-  expect(takeTicket("r2")).toBeNull();
+  expect(tableTicket(room)).toBe(ticket);
+  expect(takeTicket(other)).toBeNull();
+  // A link that was cut, or is another room's, leaves this device its ticket.
+  for (const wrong of [ticket.slice(0, -4), other + "01".repeat(32)]) {
+    history.replaceState(null, "", `${link.pathname}#ticket=${wrong}`);
+    expect(takeTicket(room)).toBe(ticket);
+    expect(location.hash).toBe("");
+  }
 });
 
 test.each(["", "#content", "#ticket=", "#ticket=%E0%A4%A"])("%j has no ticket", (hash) => {

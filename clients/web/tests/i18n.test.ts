@@ -3,6 +3,7 @@
 import { describe, expect, test } from "vitest";
 import { firstKnown, languages, setLanguage, showLanguage, t } from "../src/i18n";
 import { en } from "../src/i18n/en";
+import { time } from "../src/i18n/en/time";
 import { ordinals, plurals } from "../src/i18n/plural";
 
 /** The paths of all texts; a function counts as one. */
@@ -82,6 +83,16 @@ describe("numbers", () => {
     const { pointsWord } = t().table;
     expect(pointsWord(0)).toBe(pointsWord(5));
     expect(pointsWord(1)).not.toBe(pointsWord(5));
+  });
+
+  test.each([
+    [1_000, "1 second"],
+    [150_000, "150 seconds"],
+    [180_000, "3 minutes"],
+    [5_400_000, "90 minutes"],
+    [7_200_000, "2 hours"],
+  ])("%d milliseconds are %s", (ms, words) => {
+    expect(time(ms)).toBe(words);
   });
 
   test.each([

@@ -1,6 +1,6 @@
 // Whether the server has another version of the page than the one that is open. Looked for where the
 // server may have been replaced: after a lost connection is back, when the page is seen again, and now and then.
-// Nothing is reloaded here: parts/Update.tsx offers it.
+// parts/Update.tsx offers to load it; what cannot be loaded any more is loaded anew at once.
 
 import { signal } from "@preact/signals";
 
@@ -42,4 +42,28 @@ export function startUpdates(): void {
   };
   document.addEventListener("visibilitychange", look);
   setInterval(look, EVERY_MS);
+}
+
+/** Key of sessionStorage: when the document was last loaded again for a new version. */
+const RELOADED = "chefshat.reloaded";
+/** Nothing is loaded again so soon after: another version is not what is missing. */
+const ONCE_IN_MS = 60_000;
+
+/**
+ * After a file of the page could not be loaded: loads the document again if the server answers, since
+ * a new version of the page has other files. Returns whether it does.
+ */
+export async function reloadsForNewVersion(): Promise<boolean> {
+  try {
+    const before = Number(sessionStorage.getItem(RELOADED));
+    if (Date.now() - before < ONCE_IN_MS) return false;
+    const { ok } = await fetch("/", { method: "HEAD", cache: "no-store" });
+    if (!ok) return false;
+    sessionStorage.setItem(RELOADED, String(Date.now()));
+  } catch {
+    // The server does not answer, or this browser stores nothing and would load again for ever.
+    return false;
+  }
+  location.reload();
+  return true;
 }

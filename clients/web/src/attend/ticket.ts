@@ -1,6 +1,7 @@
 // The ticket of a physical table: what this device may report about, and the link that gives the
 // same to a tablet beside the table. The link has it after "#", which browsers send to no server.
 
+import { isSecret } from "../api/secrets";
 import { pathOf, readdress } from "../router";
 import { recall, remember } from "../store";
 
@@ -38,7 +39,8 @@ export function ticketIn(hash: string): string | null {
 export function takeTicket(roomId: string): string | null {
   const given = ticketIn(location.hash);
   if (given === null) return tableTicket(roomId);
-  keepTableTicket(roomId, given);
   readdress(location.search);
-  return given;
+  // One that was cut, or is that of another room, must not replace a good one.
+  if (isSecret(given) && given.startsWith(roomId)) keepTableTicket(roomId, given);
+  return tableTicket(roomId);
 }

@@ -27,8 +27,8 @@ export function durations(
 ): (ms: number) => string {
   const plural = plurals(language);
   return (ms) => {
-    if (ms >= 3_600_000) return plural(Math.round(ms / 3_600_000), forms.hour);
-    if (ms >= 120_000) return plural(Math.round(ms / 60_000), forms.minute);
+    if (ms >= 3_600_000 && ms % 3_600_000 === 0) return plural(ms / 3_600_000, forms.hour);
+    if (ms >= 120_000 && ms % 60_000 === 0) return plural(ms / 60_000, forms.minute);
     return plural(ms / 1000, forms.second);
   };
 }
