@@ -12,7 +12,7 @@ use crate::config::{
     MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, PICTURE_PATIENCE, RECORD_SEND_TIMEOUT,
     ServerConfig, VECTOR_SETUP_TIMEOUT,
 };
-use crate::connections::STALLED_LIMIT;
+use crate::connections::{MAX_UNREAD, STALLED_LIMIT};
 use crate::convert::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
 use crate::handshakes::{
     COST_OF_FAILED, HANDSHAKES_AT_ONCE, HANDSHAKES_PER_SECOND, MAX_HANDSHAKES,
@@ -112,6 +112,15 @@ fn of_all() -> String {
             format!(
                 "{}; after {} the connection is closed",
                 number(calls::MAX_ANSWERS),
+                seconds(STALLED_LIMIT)
+            ),
+            "",
+        ),
+        (
+            "bytes of streams that one caller does not read",
+            format!(
+                "{} MiB for longer than {}; then connections are closed",
+                MAX_UNREAD >> 20,
                 seconds(STALLED_LIMIT)
             ),
             "",

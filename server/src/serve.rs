@@ -465,10 +465,11 @@ impl Server {
             .initial_connection_window_size(CLIENT_CONNECTION_WINDOW)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
-            .layer(OriginLayer::new(origins))
+            .layer(OriginLayer::new(origins, Arc::clone(&calls)))
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer::new(
                 encrypted,
+                Arc::clone(&calls),
                 Arc::clone(&rooms),
                 config.painter.clone(),
             )?)

@@ -93,6 +93,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
   "the connection is closed; the reason is only counted": [
     "ANSWERS_NOT_READ",
     "OUT_OF_DESCRIPTORS",
+    "STREAMS_NOT_READ",
     "TOO_MANY_CONNECTIONS",
     "TOO_MANY_HANDSHAKES",
   ],

@@ -38,6 +38,9 @@ const RESERVED_DESCRIPTORS: usize = 128;
 pub const STALLED_LIMIT: Duration = Duration::from_secs(30);
 /// Time between two checks of that.
 const STALLED_INTERVAL: Duration = Duration::from_secs(5);
+/// Bytes of streams that one caller may leave unread for longer than [`STALLED_LIMIT`]. Messages that
+/// wait to be encoded take about as much again.
+pub const MAX_UNREAD: usize = 32 << 20;
 
 /// Idle time before the kernel probes the peer. Unlike HTTP/2 pings, probes cost nothing per
 /// message, and they work for HTTP/1.1 as well.
@@ -160,18 +163,23 @@ impl Connections {
         self.places.total()
     }
 
-    /// Closes connections whose clients do not read answers, until the future is dropped. What
-    /// waits for them takes memory.
+    /// Closes connections whose clients do not read answers, or too much of their streams, until the
+    /// future is dropped. What waits for them takes memory.
     pub async fn close_stalled(self: Arc<Self>) {
         let mut interval = tokio::time::interval(STALLED_INTERVAL);
         loop {
             interval.tick().await;
-            for client in self.clients() {
+            let clients = self.clients();
+            for client in &clients {
                 let stalled = client.oldest_answer();
                 if stalled.is_some_and(|since| since.elapsed() > STALLED_LIMIT) {
                     self.metrics.refused("ANSWERS_NOT_READ");
                     client.close();
                 }
+            }
+            for client in with_too_much_unread(&clients) {
+                self.metrics.refused("STREAMS_NOT_READ");
+                client.close();
             }
         }
     }
@@ -194,7 +202,7 @@ impl Connections {
             key,
             since: SystemTime::now(),
             calls: AtomicU64::new(0),
-            streams: AtomicUsize::new(0),
+            streams: Mutex::default(),
             token: Mutex::default(),
             answers: Mutex::default(),
             closing: AtomicBool::new(false),
@@ -221,6 +229,74 @@ impl Connections {
     }
 }
 
+/// The clients to disconnect so that each caller leaves at most [`MAX_UNREAD`] bytes unread: those that
+/// leave most.
+fn with_too_much_unread(clients: &[Arc<Client>]) -> Vec<&Arc<Client>> {
+    let mut by_caller: BTreeMap<Key, Vec<(usize, &Arc<Client>)>> = BTreeMap::new();
+    for client in clients {
+        let mut unread: BTreeMap<Key, usize> = BTreeMap::new();
+        for stream in client.unread().values().filter(|it| it.is_stalled()) {
+            *unread.entry(stream.key).or_default() += stream.bytes.load(Relaxed);
+        }
+        for (key, bytes) in unread {
+            by_caller.entry(key).or_default().push((bytes, client));
+        }
+    }
+    let mut closed = Vec::new();
+    for mut unread in by_caller.into_values() {
+        unread.sort_by_key(|(bytes, _)| *bytes);
+        let mut kept = 0;
+        for (bytes, client) in unread {
+            kept += bytes;
+            if kept > MAX_UNREAD {
+                closed.push(client);
+            }
+        }
+    }
+    closed
+}
+
+/// What the client of a stream has not read.
+#[derive(Debug)]
+pub struct Unread {
+    /// Who is charged for the stream.
+    key: Key,
+    began: Instant,
+    /// Bytes that wait for the client.
+    bytes: AtomicUsize,
+    /// When some of them were sent, or the first began to wait, in milliseconds since the stream began.
+    moved_ms: AtomicU64,
+}
+
+impl Unread {
+    /// More bytes wait for the client.
+    pub fn waits(&self, bytes: usize) {
+        if self.bytes.fetch_add(bytes, Relaxed) == 0 {
+            self.moved();
+        }
+    }
+
+    /// Some of them have been sent, or never will be.
+    pub fn sent(&self, bytes: usize) {
+        self.bytes.fetch_sub(bytes, Relaxed);
+        self.moved();
+    }
+
+    fn moved(&self) {
+        self.moved_ms.store(self.elapsed_ms(), Relaxed);
+    }
+
+    fn elapsed_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Whether bytes wait, of which none has been sent for [`STALLED_LIMIT`].
+    fn is_stalled(&self) -> bool {
+        let still_ms = (self.elapsed_ms()).saturating_sub(self.moved_ms.load(Relaxed));
+        self.bytes.load(Relaxed) > 0 && Duration::from_millis(still_ms) > STALLED_LIMIT
+    }
+}
+
 /// The client at the other end of a connection.
 #[derive(Debug)]
 pub struct Client {
@@ -233,7 +309,8 @@ pub struct Client {
     /// When it connected.
     pub since: SystemTime,
     calls: AtomicU64,
-    streams: AtomicUsize,
+    /// Its open streams, by the number of the call.
+    streams: Mutex<BTreeMap<u64, Arc<Unread>>>,
     /// The token that it used last.
     token: Mutex<Option<TokenId>>,
     /// Answers that it has not read completely, by the number of the call, with the time at which
@@ -259,7 +336,7 @@ impl Client {
 
     /// Number of its open streams.
     pub fn streams(&self) -> usize {
-        self.streams.load(Relaxed)
+        self.unread().len()
     }
 
     /// The token that it used last.
@@ -275,12 +352,21 @@ impl Client {
         self.calls.fetch_add(1, Relaxed)
     }
 
-    /// Counts streams that begin or end.
-    pub fn count_stream(&self, begins: bool) {
-        match begins {
-            true => self.streams.fetch_add(1, Relaxed),
-            false => self.streams.fetch_sub(1, Relaxed),
-        };
+    /// A stream of this caller begins.
+    pub fn stream_begins(&self, call: u64, key: Key) -> Arc<Unread> {
+        let unread = Arc::new(Unread {
+            key,
+            began: Instant::now(),
+            bytes: AtomicUsize::new(0),
+            moved_ms: AtomicU64::new(0),
+        });
+        self.unread().insert(call, Arc::clone(&unread));
+        unread
+    }
+
+    /// A stream has ended, and nothing of it waits for the client.
+    pub fn stream_gone(&self, call: u64) {
+        self.unread().remove(&call);
     }
 
     /// An answer is ready, and waits until the client reads it.
@@ -309,6 +395,10 @@ impl Client {
 
     fn oldest_answer(&self) -> Option<Instant> {
         self.answers().values().min().copied()
+    }
+
+    fn unread(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<Unread>>> {
+        (self.streams.lock()).expect("nothing panics under this lock")
     }
 
     fn answers(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
@@ -568,6 +658,40 @@ mod tests {
             KEEPALIVE_IDLE
         );
         assert!(socket.tcp_nodelay().expect("an option"));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_leaves_too_much_of_its_streams_unread_is_disconnected() {
+        let connections = Connections::new(limits(8), Arc::default());
+        let client = || {
+            let address = SocketAddr::from(([127, 0, 0, 1], 1));
+            connections.admit(Some(address)).expect("there is space")
+        };
+        let (one, other) = (Key::Local, Key::Address([192, 0, 2, 7].into()));
+        let clients: Vec<Arc<Client>> = std::iter::repeat_with(client).take(3).collect();
+        let streams = [one, one, other].map(|key| (key, MAX_UNREAD / 3));
+        let mut unread = Vec::new();
+        for (client, (key, bytes)) in clients.iter().zip(streams) {
+            let stream = client.stream_begins(1, key);
+            stream.waits(bytes);
+            unread.push(stream);
+        }
+        let closed = |clients: &[Arc<Client>]| -> Vec<u64> {
+            let closed = with_too_much_unread(clients);
+            closed.into_iter().map(|client| client.id).collect()
+        };
+        tokio::time::advance(2 * STALLED_LIMIT).await;
+        assert!(closed(&clients).is_empty(), "each caller may leave as much");
+        unread[0].waits(MAX_UNREAD);
+        assert_eq!(closed(&clients), [clients[0].id], "who leaves most");
+        // A client that reads, however slowly, keeps its connection.
+        unread[0].sent(1);
+        assert!(closed(&clients).is_empty());
+        tokio::time::advance(2 * STALLED_LIMIT).await;
+        unread[0].sent(MAX_UNREAD);
+        assert!(closed(&clients).is_empty());
+        clients[0].stream_gone(1);
+        assert_eq!(clients[0].streams(), 0);
     }
 
     #[tokio::test]

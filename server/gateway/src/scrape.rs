@@ -27,6 +27,7 @@ use tower::util::MapResponse;
 
 use crate::tls::Tls;
 use crate::web::{OriginLayer, Origins};
+use chefshat_admission::limits::{CallLimits, Shares};
 use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
 use chefshat_base::tasks::short;
@@ -63,7 +64,8 @@ async fn serve_within(
     let router = MapResponse::new(router, |answer: Response<axum::body::Body>| {
         answer.map(tonic::body::Body::new)
     });
-    let checked = OriginLayer::new(origins).layer(router);
+    let limits = Arc::new(CallLimits::new(Shares::default()));
+    let checked = OriginLayer::new(origins, limits).layer(router);
     let places = Arc::new(Semaphore::new(max_connections));
     // The semaphore is never closed.
     while let Ok(place) = Arc::clone(&places).acquire_owned().await {

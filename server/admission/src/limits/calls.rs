@@ -225,6 +225,23 @@ impl CallLimits {
         self.lists.take(key).await
     }
 
+    /// Admits the answer to a request that is no call and is ready, as soon as its caller has read others;
+    /// `None` if that takes too long.
+    pub async fn admit_answer(&self, key: Key) -> Option<Admitted> {
+        self.calls.charge(key, 1);
+        let kept = match self.answers.try_take(key) {
+            Some(kept) => kept,
+            None => {
+                let _waiting = self.place_to_wait(key)?;
+                within(self.answers.take(key)).await?
+            }
+        };
+        Some(Admitted {
+            executing: None,
+            _kept: kept,
+        })
+    }
+
     /// A place to wait in, for a call or for a refusal; `None` if its caller has too many calls
     /// that wait.
     pub fn place_to_wait(&self, key: Key) -> Option<Permit> {

@@ -1,6 +1,6 @@
 //! The layer in front of all services that holds each caller to its share: of calls, of answers
 //! that it does not read, and of streams. `limits` decides; this file keeps the places of calls
-//! until their answers have been read.
+//! until their answers have been read: the transport takes a message long before it can send it.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use tonic::{Code, Status};
 use tower::{Layer, Service};
 
 use super::status::{Refusal, is_elsewhere, status};
-use crate::connections::{Client, peer_address};
+use crate::connections::{Client, Unread, peer_address};
 use chefshat_admission::access::{Call, Caller};
-use chefshat_admission::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
+use chefshat_admission::limits::{Admitted, BYTES_PER_CALL, CallLimits, Executing, Key};
 
 /// Who is charged for a request.
 pub(super) fn charged(extensions: &http::Extensions) -> Key {
@@ -27,6 +27,14 @@ pub(super) fn charged(extensions: &http::Extensions) -> Key {
         Some(caller) => Key::of_caller(caller),
         // Refused before its caller was known.
         None => Key::of_address(peer_address(extensions)),
+    }
+}
+
+/// Lets others be executed in place of the call with these extensions, because it only waits from now on.
+pub(super) fn make_way(extensions: &http::Extensions) {
+    let executing: Option<&Executing> = extensions.get();
+    if let Some(executing) = executing {
+        executing.give_back();
     }
 }
 
@@ -156,6 +164,8 @@ where
             client,
             number,
             is_stream,
+            charges_bytes: !is_stream,
+            unread: None,
             admitted: None,
         };
         if let Some(admitted) = self.limits.admit_now(key, is_stream, cost) {
@@ -195,6 +205,10 @@ struct Place {
     /// The number of the call on its connection.
     number: u64,
     is_stream: bool,
+    /// Whether large parts of the answer are charged.
+    charges_bytes: bool,
+    /// What the client has not read of a stream.
+    unread: Option<Arc<Unread>>,
     admitted: Option<Admitted>,
 }
 
@@ -205,9 +219,8 @@ impl Place {
             request.extensions_mut().insert(executing.clone());
         }
         self.admitted = Some(admitted);
-        if let Some(client) = self.client.as_ref().filter(|_| self.is_stream) {
-            client.count_stream(true);
-        }
+        let client = self.client.as_ref().filter(|_| self.is_stream);
+        self.unread = client.map(|client| client.stream_begins(self.number, self.key));
     }
 
     /// Keeps the place until the answer has been read.
@@ -227,7 +240,8 @@ impl Place {
             if let Some(client) = self.client.as_ref().filter(|_| !self.is_stream) {
                 client.answer_ready(self.number);
             }
-            Body::new(KeptBody { body, place: self })
+            let place = Arc::new(self);
+            Body::new(KeptBody { body, place })
         })
     }
 }
@@ -235,11 +249,62 @@ impl Place {
 impl Drop for Place {
     fn drop(&mut self) {
         match &self.client {
-            Some(client) if self.is_stream && self.admitted.is_some() => {
-                client.count_stream(false);
-            }
-            Some(client) if !self.is_stream => client.answer_gone(self.number),
-            _ => {}
+            Some(client) if self.is_stream => client.stream_gone(self.number),
+            Some(client) => client.answer_gone(self.number),
+            None => {}
+        }
+    }
+}
+
+/// The answer to a request that is no call, such as one for a file of the page. It has a place in the
+/// share of its caller until it has been read; `None` if none is left.
+pub(crate) async fn within_share(
+    limits: &Arc<CallLimits>,
+    extensions: &http::Extensions,
+    answer: Response<Body>,
+) -> Option<Response<Body>> {
+    let key = charged(extensions);
+    let admitted = limits.admit_answer(key).await?;
+    let client = own_client(extensions).cloned();
+    let place = Place {
+        limits: Arc::clone(limits),
+        key,
+        number: client.as_ref().map_or(0, |client| client.called(None)),
+        client,
+        is_stream: false,
+        // What everybody may load costs little to send.
+        charges_bytes: false,
+        unread: None,
+        admitted: Some(admitted),
+    };
+    Some(place.keep(answer))
+}
+
+/// Part of an answer, with the place of its call: the transport keeps it until it is sent.
+struct KeptData {
+    data: Bytes,
+    place: Arc<Place>,
+}
+
+impl KeptData {
+    fn bytes(data: Bytes, place: Arc<Place>) -> Bytes {
+        if let Some(unread) = &place.unread {
+            unread.waits(data.len());
+        }
+        Bytes::from_owner(Self { data, place })
+    }
+}
+
+impl AsRef<[u8]> for KeptData {
+    fn as_ref(&self) -> &[u8] {
+        &self.data
+    }
+}
+
+impl Drop for KeptData {
+    fn drop(&mut self) {
+        if let Some(unread) = &self.place.unread {
+            unread.sent(self.data.len());
         }
     }
 }
@@ -247,7 +312,7 @@ impl Drop for Place {
 /// An answer, with the place of its call. Large answers are charged.
 struct KeptBody {
     body: Body,
-    place: Place,
+    place: Arc<Place>,
 }
 
 impl HttpBody for KeptBody {
@@ -258,17 +323,20 @@ impl HttpBody for KeptBody {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let frame = Pin::new(&mut self.body).poll_frame(context);
-        if !self.place.is_stream
-            && let Poll::Ready(Some(Ok(frame))) = &frame
+        let frame = std::task::ready!(Pin::new(&mut self.body).poll_frame(context));
+        let place = &self.place;
+        if place.charges_bytes
+            && let Some(Ok(frame)) = &frame
             && let Some(data) = frame.data_ref()
         {
             let cost = data.len() as u64 / BYTES_PER_CALL;
             if cost > 0 {
-                self.place.limits.charge(self.place.key, cost);
+                place.limits.charge(place.key, cost);
             }
         }
-        frame
+        Poll::Ready(
+            frame.map(|frame| Ok(frame?.map_data(|data| KeptData::bytes(data, Arc::clone(place))))),
+        )
     }
 
     fn is_end_stream(&self) -> bool {
@@ -288,7 +356,7 @@ mod tests {
     use tower::service_fn;
 
     use super::*;
-    use chefshat_admission::limits::{Executing, Shares};
+    use chefshat_admission::limits::{Shares, calls::MAX_ANSWERS};
 
     /// More calls than may be executed at a time.
     const MANY: usize = 100;
@@ -319,6 +387,34 @@ mod tests {
             assert!(call.now_or_never().is_none(), "{path} waits");
         }
         call("/at_once").now_or_never().is_some()
+    }
+
+    #[tokio::test]
+    async fn the_place_of_an_answer_is_free_when_its_last_byte_has_been_sent() {
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let answer = |_: Request<Body>| async {
+            let text = http_body_util::Full::new(Bytes::from_static(b"an answer"));
+            let body = Body::new(http_body_util::BodyExt::map_err(
+                text,
+                |never| match never {},
+            ));
+            Ok::<_, Infallible>(Response::new(body))
+        };
+        let mut services = LimitsLayer::new(limits).layer(service_fn(answer));
+        // The transport takes an answer and lets go of its body, whether or not the client reads.
+        let mut take = || {
+            let request = Request::builder().uri("/").body(Body::empty());
+            let call = services.call(request.expect("a request"));
+            let mut body = call.now_or_never()?.expect("infallible").into_body();
+            let frame = http_body_util::BodyExt::frame(&mut body).now_or_never();
+            let frame = frame.flatten().expect("a frame").expect("no error");
+            Some(frame.into_data().expect("data"))
+        };
+        let mut unread: Vec<Bytes> = std::iter::from_fn(&mut take).take(MAX_ANSWERS).collect();
+        assert_eq!(unread.len(), MAX_ANSWERS / 2, "the share of a caller");
+        assert!(take().is_none());
+        unread.pop();
+        assert_eq!(take().as_deref(), Some(&b"an answer"[..]));
     }
 
     #[tokio::test]

@@ -43,6 +43,7 @@ pub use heartbeats::HeartbeatLayer;
 pub use info::Info;
 pub use instruments::Instruments;
 pub use limits::LimitsLayer;
+pub(crate) use limits::within_share;
 pub use lookup::Lookup;
 pub use play::{OfNodes, Play};
 pub use recorded::Recorded;

@@ -78,9 +78,9 @@ pub(super) fn absent(method: &Method) -> Response<Bytes> {
     finished(not_found(), method)
 }
 
-/// The answer if too many others wait for such a file.
+/// The answer if too many others wait for such a file, or its caller has too many unread ones.
 pub(super) fn busy(method: &Method) -> Response<Bytes> {
-    let text = b"too many requests for pictures; try again later\n";
+    let text = b"too many requests at a time; try again later\n";
     let mut response = plain(StatusCode::SERVICE_UNAVAILABLE, "text/plain", text);
     let headers = response.headers_mut();
     headers.insert(header::RETRY_AFTER, RETRY_AFTER);

@@ -28,6 +28,8 @@ pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
 pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING};
 
+use crate::grpc::within_share;
+use chefshat_admission::limits::CallLimits;
 use chefshat_hosting::config::PaintingSettings;
 use chefshat_hosting::rooms::Rooms;
 
@@ -43,22 +45,28 @@ pub fn is_built() -> bool {
 #[derive(Debug, Clone)]
 pub struct PageLayer {
     tls: bool,
+    limits: Arc<CallLimits>,
     previews: Arc<Previews>,
 }
 
 impl PageLayer {
-    /// Creates the page. `tls`: whether browsers reach this server with TLS. `rooms`: whose games it
-    /// previews. `painter`: what draws the previews.
+    /// Creates the page. `tls`: whether browsers reach this server with TLS. `limits`: what holds each
+    /// caller to its share. `rooms`: whose games it previews. `painter`: what draws the previews.
     ///
     /// # Errors
     /// The operating system cannot start the thread that reads their records.
     pub fn new(
         tls: bool,
+        limits: Arc<CallLimits>,
         rooms: Arc<Rooms>,
         painter: Option<PaintingSettings>,
     ) -> Result<Self, ThreadPoolBuildError> {
         let previews = Arc::new(Previews::new(rooms, painter)?);
-        Ok(Self { tls, previews })
+        Ok(Self {
+            tls,
+            limits,
+            previews,
+        })
     }
 }
 
@@ -102,23 +110,38 @@ where
         let clone = self.services.clone();
         let services = std::mem::replace(&mut self.services, clone);
         let page = self.layer.clone();
+        let request = request.map(drop);
         Either::Right(Box::pin(async move {
-            let request = request.map(drop);
-            let path = request.uri().path();
-            let answer = match Link::of(path) {
-                None if path == HEALTH => health(
-                    is_serving(services, request.extensions()).await,
-                    request.method(),
-                ),
-                None => of_files(request, |request| answer(find, request)).await,
-                Some(link) => page.previewed(link, services, &request).await,
-            };
-            Ok(answer.map(|bytes| Body::new(axum::body::Body::from(bytes))))
+            let extensions = request.extensions().clone();
+            let method = request.method().clone();
+            let answer = with_body(page.answer(request, services).await);
+            let answer = within_share(&page.limits, &extensions, answer).await;
+            Ok(answer.unwrap_or_else(|| with_body(busy(&method))))
         }))
     }
 }
 
+fn with_body(answer: Response<Bytes>) -> Response<Body> {
+    answer.map(|bytes| Body::new(axum::body::Body::from(bytes)))
+}
+
 impl PageLayer {
+    async fn answer<S>(&self, request: Request<()>, services: S) -> Response<Bytes>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        let path = request.uri().path();
+        match Link::of(path) {
+            None if path == HEALTH => health(
+                is_serving(services, request.extensions()).await,
+                request.method(),
+            ),
+            None => of_files(request, |request| answer(find, request)).await,
+            Some(link) => self.previewed(link, services, &request).await,
+        }
+    }
+
     /// The answer to a request for the replay of a game or its picture.
     async fn previewed<S>(&self, link: Link, services: S, request: &Request<()>) -> Response<Bytes>
     where

@@ -4,13 +4,12 @@
 //! machine, the host of a request must be a name of this machine: otherwise a page could reach it
 //! under its own name (DNS rebinding).
 
-use std::future::{Ready, ready};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use axum::body::Body as Text;
-use futures::future::Either;
+use futures::future::{BoxFuture, Either};
 use http::uri::Authority;
 use http::{HeaderName, HeaderValue, Request, Response, StatusCode, header};
 use tonic::body::Body;
@@ -18,7 +17,8 @@ use tower::{Layer, Service};
 use tracing::info;
 
 use crate::connections::peer_address;
-use chefshat_admission::limits::LogPace;
+use crate::grpc::within_share;
+use chefshat_admission::limits::{CallLimits, LogPace};
 
 /// Whose pages and under which names the server may be reached.
 #[derive(Debug)]
@@ -111,12 +111,18 @@ fn is_named(host: &Authority, hosts: &[String]) -> bool {
 
 /// Refuses requests of foreign pages.
 #[derive(Debug, Clone)]
-pub struct OriginLayer(Arc<Origins>);
+pub struct OriginLayer {
+    origins: Arc<Origins>,
+    limits: Arc<CallLimits>,
+}
 
 impl OriginLayer {
-    /// Creates a layer that admits these origins.
-    pub fn new(origins: Origins) -> Self {
-        Self(Arc::new(origins))
+    /// Creates a layer that admits these origins. `limits`: what holds each caller to its share.
+    pub fn new(origins: Origins, limits: Arc<CallLimits>) -> Self {
+        Self {
+            origins: Arc::new(origins),
+            limits,
+        }
     }
 }
 
@@ -125,7 +131,7 @@ impl<S> Layer<S> for OriginLayer {
 
     fn layer(&self, services: S) -> Self::Service {
         WithOrigin {
-            origins: Arc::clone(&self.0),
+            layer: self.clone(),
             services,
         }
     }
@@ -134,7 +140,7 @@ impl<S> Layer<S> for OriginLayer {
 /// The services behind the check of origins.
 #[derive(Debug, Clone)]
 pub struct WithOrigin<S> {
-    origins: Arc<Origins>,
+    layer: OriginLayer,
     services: S,
 }
 
@@ -144,22 +150,28 @@ where
 {
     type Response = Response<Body>;
     type Error = S::Error;
-    type Future = Either<Ready<Result<Self::Response, Self::Error>>, S::Future>;
+    type Future = Either<BoxFuture<'static, Result<Self::Response, Self::Error>>, S::Future>;
 
     fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
         self.services.poll_ready(context)
     }
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
-        match self.origins.check(&request) {
+        let OriginLayer { origins, limits } = &self.layer;
+        match origins.check(&request) {
             Ok(()) => Either::Right(self.services.call(request)),
             Err(foreign) => {
-                if self.origins.logged.admits() {
+                if origins.logged.admits() {
                     let address = peer_address(request.extensions());
                     let address = address.map(tracing::field::display);
                     info!(address, ?foreign, "a request was refused");
                 }
-                Either::Left(ready(Ok(refused(foreign))))
+                let (limits, extensions) = (Arc::clone(limits), request.extensions().clone());
+                Either::Left(Box::pin(async move {
+                    let kept = within_share(&limits, &extensions, refused(foreign)).await;
+                    // Without a share, the headers alone.
+                    Ok(kept.unwrap_or_else(|| refused(foreign).map(|_| Body::empty())))
+                }))
             }
         }
     }

@@ -17,6 +17,7 @@ use tower::service_fn;
 
 use super::*;
 use crate::connections::ForwardedClient;
+use chefshat_admission::limits::{Shares, calls::MAX_ANSWERS};
 use chefshat_hosting::config::{PICTURE_PATIENCE, ServerConfig};
 use chefshat_store::MemoryStore;
 
@@ -95,6 +96,7 @@ fn page_of(rooms: &Arc<Rooms>) -> PageLayer {
     let painter = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web/painter.sh");
     PageLayer::new(
         false,
+        Arc::new(CallLimits::new(Shares::default())),
         Arc::clone(rooms),
         Some(PaintingSettings::new(painter)),
     )
@@ -108,6 +110,28 @@ fn rooms() -> Arc<Rooms> {
 
 fn picture(game: usize) -> String {
     format!("/replay/{game:032x}.png")
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_caller_that_reads_nothing_of_the_page_holds_up_no_other() {
+    let (page, services) = (page(), Services::new(1));
+    let ask = async |caller| get(&page, &services, "/assets/none.js", caller).await;
+    let mut unread = Vec::new();
+    loop {
+        let answer = ask(1).await;
+        if answer.status() == StatusCode::SERVICE_UNAVAILABLE {
+            break;
+        }
+        unread.push(answer);
+    }
+    assert_eq!(
+        unread.len(),
+        MAX_ANSWERS / 10,
+        "the share of a caller elsewhere"
+    );
+    assert_eq!(ask(2).await.status(), StatusCode::NOT_FOUND);
+    unread.pop();
+    assert_eq!(ask(1).await.status(), StatusCode::NOT_FOUND);
 }
 
 #[tokio::test]
