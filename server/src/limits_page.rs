@@ -14,6 +14,7 @@ use crate::config::{
 };
 use crate::connections::{MAX_UNREAD, STALLED_LIMIT};
 use crate::convert::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
+use crate::grpc::MAX_WAITING_MEMORY;
 use crate::handshakes::{
     COST_OF_FAILED, HANDSHAKES_AT_ONCE, HANDSHAKES_PER_SECOND, MAX_HANDSHAKES,
 };
@@ -149,6 +150,14 @@ fn of_all() -> String {
                 "{} MiB, and as much for those of players; others wait for {}",
                 decoding::MAX_DECODED >> 20,
                 seconds(fair_semaphore::MAX_WAIT)
+            ),
+            "",
+        ),
+        (
+            "memory of commands that wait for a seat to be attached, or for another node",
+            format!(
+                "{} MiB; further ones are refused, or read later",
+                MAX_WAITING_MEMORY >> 20
             ),
             "",
         ),

@@ -45,7 +45,7 @@ pub use instruments::Instruments;
 pub use limits::LimitsLayer;
 pub(crate) use limits::within_share;
 pub use lookup::Lookup;
-pub use play::{OfNodes, Play};
+pub use play::{MAX_WAITING_MEMORY, OfNodes, Play};
 pub use recorded::Recorded;
 pub use records::Records;
 pub use refusals::count_refusals;

@@ -11,6 +11,7 @@ mod participants;
 mod reader;
 mod remote;
 mod requests;
+mod waiting;
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -25,12 +26,12 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
-use super::limits::Arrived;
+use super::limits::{Arrived, make_way};
 use super::lookup::Lookup;
 use super::status::{field, request_id, room_failed, room_unknown, stream_ended, ticket_unknown};
 use crate::peers::Peers;
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{Executing, Hint, Key};
+use chefshat_admission::limits::{Executing, FairSemaphore, Hint, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::cluster::Directory;
@@ -49,6 +50,8 @@ use chefshat_wire::encoded::peer::{
 use chefshat_wire::encoded::service::play_service_server::PlayService;
 use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
 use reader::{Reader, Requests, express_action};
+pub use waiting::MAX_WAITING_MEMORY;
+use waiting::WaitingMemory;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -56,6 +59,8 @@ pub struct Play {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
     lookup: Lookup,
+    /// Of commands that wait, of all streams.
+    waiting: Arc<FairSemaphore>,
     /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
@@ -69,6 +74,7 @@ impl Play {
     ) -> Self {
         Self {
             lookup: Lookup::new(Arc::clone(&rooms), Arc::clone(&tournaments)),
+            waiting: WaitingMemory::for_all(rooms.shares()),
             rooms,
             tournaments,
             closing,
@@ -81,6 +87,7 @@ impl Play {
         Reader::new(
             &self.rooms,
             &self.tournaments,
+            WaitingMemory::of(&self.waiting, Key::of_caller(&caller)),
             caller,
             outbox,
             with_decisions,
@@ -173,10 +180,8 @@ impl PeerService for OfNodes {
         &self,
         request: Request<ReachRequest>,
     ) -> Result<Response<ReachResponse>, Status> {
-        if let Some(executing) = request.extensions().get::<Executing>() {
-            // Others are not delayed while it is reached.
-            executing.give_back();
-        }
+        // Others are not delayed while it is reached.
+        make_way(request.extensions());
         let name = request.into_inner().node;
         let (_, others) = self.directory.nodes().await;
         let Some(peer) = others.iter().find(|peer| *peer.node == *name) else {

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::task::{Context, Poll};
 
 use chefshat_engine::MAX_ENTROPY;
-use chefshat_proto::v1::{self, seat_command::Command};
+use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
 use tokio::time::Instant;
 use tokio_util::task::AbortOnDropHandle;
@@ -16,13 +16,14 @@ use tonic::{Code, Status};
 use super::parked::{Found, Parked, Parking, search};
 use super::reader::{BoundSeat, Contested, DETACHED_KEPT, Reader};
 use super::remote::NotPassedOn;
+use super::waiting::WaitingCommand;
 use crate::grpc::lookup::Lookup;
 use crate::grpc::status::{is_elsewhere, owner_unreachable, status, ticket_unknown};
 use crate::grpc::takeover::{is_changing, waits};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Payer;
 use chefshat_base::tasks::short;
-use chefshat_hosting::config::MAX_SEATS_PER_STREAM;
+use chefshat_hosting::config::{MAX_COMMANDS_CONTESTED, MAX_SEATS_PER_STREAM};
 use chefshat_hosting::room::subscriber::DeliveryOptions;
 use chefshat_hosting::room::{AttachRequest, NotAttached, RoomError, RoomGone, Supersedes};
 use chefshat_room::ids::{RoomToken, UnitToken};
@@ -155,9 +156,10 @@ impl Reader {
                 *held_back = commands;
                 continue;
             }
-            for (command, arrived) in commands {
+            for held in commands {
+                let command = held.command;
                 let command = v1::SeatCommand { handle, command };
-                self.execute_elsewhere(command, arrived).await;
+                self.execute_elsewhere(command, held.arrived).await;
             }
         }
         let Some(parking) = self.parked.as_ref().filter(|it| it.count() > 0) else {
@@ -189,11 +191,24 @@ impl Reader {
         })
     }
 
+    /// Lets a command wait if its seat waits to be attached, and has space for it. Returns whether it
+    /// does.
+    pub(super) fn hold_back(&mut self, command: &mut v1::SeatCommand, arrived: Instant) -> bool {
+        let waiting = self.waiting.clone();
+        let Some(held_back) = self.held_back(command.handle) else {
+            return false;
+        };
+        if held_back.len() == MAX_COMMANDS_CONTESTED {
+            return false;
+        }
+        let held = waiting.hold(&mut command.command, arrived);
+        let is_held = held.is_some();
+        held_back.extend(held);
+        is_held
+    }
+
     /// The commands that are read until a seat is attached, if it waits for something.
-    pub(super) fn held_back(
-        &mut self,
-        handle: u32,
-    ) -> Option<&mut Vec<(Option<Command>, Instant)>> {
+    fn held_back(&mut self, handle: u32) -> Option<&mut Vec<WaitingCommand>> {
         if let Some(contested) = self.contested.get_mut(&handle) {
             return Some(&mut contested.commands);
         }
@@ -351,8 +366,9 @@ impl Reader {
             *held_back = commands;
             return;
         }
-        for (command, arrived) in commands {
-            self.execute_command(handle, command, arrived).await;
+        for held in commands {
+            self.execute_command(handle, held.command, held.arrived)
+                .await;
         }
     }
 }

@@ -8,6 +8,7 @@ use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
 use super::reader::{Reader, Requests as _};
+use super::waiting::WaitingMemory;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
 use chefshat_hosting::config::ServerConfig;
@@ -46,7 +47,14 @@ impl Server {
     fn stream(&self) -> Stream {
         let (outbox, updates) = Outbox::new();
         let caller = Caller::default();
-        let reader = Reader::new(&self.rooms, &self.tournaments, caller, &outbox, true);
+        let reader = Reader::new(
+            &self.rooms,
+            &self.tournaments,
+            WaitingMemory::for_tests(),
+            caller,
+            &outbox,
+            true,
+        );
         Stream { reader, updates }
     }
 

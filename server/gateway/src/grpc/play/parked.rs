@@ -7,13 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
-use chefshat_proto::v1::{self, seat_command::Command};
+use chefshat_proto::v1;
 use chefshat_room::ids::UnitToken;
 use futures::{StreamExt as _, stream};
 use tokio::time::{Instant, Sleep, sleep};
 use tokio_util::task::AbortOnDropHandle;
 use tonic::Status;
 
+use super::waiting::WaitingCommand;
 use crate::grpc::takeover::{PATIENCE, Pauses};
 
 /// Most attachments of one stream that are looked for at a time.
@@ -24,7 +25,7 @@ pub(super) struct Parked {
     pub(super) attach: v1::Attach,
     pub(super) since: Instant,
     /// Its commands that have been read meanwhile.
-    pub(super) commands: Vec<(Option<Command>, Instant)>,
+    pub(super) commands: Vec<WaitingCommand>,
 }
 
 impl Parked {

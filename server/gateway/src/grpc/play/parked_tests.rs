@@ -14,6 +14,7 @@ use tokio_util::task::TaskTracker;
 
 use super::parked::search;
 use super::reader::Reader;
+use super::waiting::WaitingMemory;
 use crate::grpc::forward::ForwardLayer;
 use crate::grpc::status::{owner_unreachable, ticket_unknown};
 use crate::peers::PeerPort;
@@ -130,7 +131,14 @@ impl Node {
     fn stream(&self) -> Stream {
         let (outbox, updates) = Outbox::new();
         let caller = Caller::default();
-        let reader = Reader::new(&self.rooms, &self.tournaments, caller, &outbox, true);
+        let reader = Reader::new(
+            &self.rooms,
+            &self.tournaments,
+            WaitingMemory::for_tests(),
+            caller,
+            &outbox,
+            true,
+        );
         Stream { reader, updates }
     }
 

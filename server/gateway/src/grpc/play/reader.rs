@@ -17,11 +17,12 @@ use tonic::{Code, Status, Streaming};
 
 use super::parked::{Found, Parking};
 use super::remote::{FIRST_ASSIGNED_HANDLE, NodeGone, RemoteSeats};
+use super::waiting::{WaitingCommand, WaitingMemory};
 use crate::grpc::forward::Gateway;
 use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status};
 use chefshat_admission::access::Caller;
-use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_CONTESTED};
+use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING};
 use chefshat_hosting::room::{Handle, Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{Call, TournamentHandle, Tournaments};
@@ -94,7 +95,7 @@ pub(super) struct Contested {
     /// The number of the connection that has it.
     pub(super) holder: u64,
     /// Its commands that have been read meanwhile.
-    pub(super) commands: Vec<(Option<Command>, Instant)>,
+    pub(super) commands: Vec<WaitingCommand>,
 }
 
 /// Reads the requests of one stream, and attaches seats that participants of tournaments are called
@@ -102,6 +103,7 @@ pub(super) struct Contested {
 pub(super) struct Reader {
     pub(super) rooms: Arc<Rooms>,
     pub(super) tournaments: Arc<Tournaments>,
+    pub(super) waiting: WaitingMemory,
     pub(super) caller: Caller,
     pub(super) outbox: Arc<Outbox>,
     /// The attached seats, by handle.
@@ -164,6 +166,7 @@ impl Reader {
     pub(super) fn new(
         rooms: &Arc<Rooms>,
         tournaments: &Arc<Tournaments>,
+        waiting: WaitingMemory,
         caller: Caller,
         outbox: &Arc<Outbox>,
         with_decisions: bool,
@@ -172,6 +175,7 @@ impl Reader {
         Self {
             rooms: Arc::clone(rooms),
             tournaments: Arc::clone(tournaments),
+            waiting,
             caller,
             outbox: Arc::clone(outbox),
             seats: BTreeMap::new(),
@@ -194,9 +198,10 @@ impl Reader {
 
     /// Lets the stream have seats at other nodes.
     pub(super) fn with_remote(mut self, gateway: Option<Gateway>) -> Self {
-        let clock = self.rooms.process_clock();
-        self.remote =
-            gateway.map(|gateway| Box::new(RemoteSeats::new(gateway, &self.outbox, clock)));
+        self.remote = gateway.map(|gateway| {
+            let (clock, waiting) = (self.rooms.process_clock(), self.waiting.clone());
+            Box::new(RemoteSeats::new(gateway, &self.outbox, clock, waiting))
+        });
         self
     }
 
@@ -314,11 +319,13 @@ impl Reader {
 
     /// Executes a command for a seat of another node there, and any other here. One for a seat that
     /// waits to be attached waits with it.
-    pub(super) async fn execute_elsewhere(&mut self, command: v1::SeatCommand, arrived: Instant) {
-        if let Some(held_back) = self.held_back(command.handle)
-            && held_back.len() < MAX_COMMANDS_CONTESTED
-        {
-            return held_back.push((command.command, arrived));
+    pub(super) async fn execute_elsewhere(
+        &mut self,
+        mut command: v1::SeatCommand,
+        arrived: Instant,
+    ) {
+        if self.hold_back(&mut command, arrived) {
+            return;
         }
         let command = match &self.remote {
             None => Ok(Some(command)),
@@ -493,7 +500,15 @@ mod tests {
         let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
         let rooms = rooms.expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
-        Reader::new(&rooms, &tournaments, Caller::default(), outbox, true)
+        let waiting = WaitingMemory::for_tests();
+        Reader::new(
+            &rooms,
+            &tournaments,
+            waiting,
+            Caller::default(),
+            outbox,
+            true,
+        )
     }
 
     /// Executes commands for a seat that there is not: each is refused.

@@ -14,6 +14,7 @@ use chefshat_proto::v1::{self, seat_command::Command};
 use futures::StreamExt as _;
 use futures::future::join_all;
 use futures::stream;
+use prost::Message as _;
 use tokio::sync::{Notify, mpsc};
 use tokio::time::{Instant, sleep};
 use tokio_stream::wrappers::ReceiverStream;
@@ -23,6 +24,7 @@ use tonic::{Code, Request, Status};
 use tracing::debug;
 
 use super::parked::Parked;
+use super::waiting::WaitingMemory;
 use chefshat_base::clock::ProcessClock;
 use chefshat_hosting::cluster::{Directory, Elsewhere, FoundBy, Peer};
 
@@ -30,6 +32,7 @@ use crate::grpc::forward::Gateway;
 use crate::grpc::takeover::awaited;
 use crate::peers::{PING_INTERVAL, PING_TIMEOUT};
 use chefshat_admission::access::MAX_INPUTS_PER_MESSAGE;
+use chefshat_admission::limits::Permit;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
 use chefshat_hosting::room::Loss;
@@ -53,6 +56,7 @@ pub(super) struct RemoteSeats {
     gateway: Gateway,
     outbox: Arc<Outbox>,
     clock: Arc<ProcessClock>,
+    waiting: WaitingMemory,
     streams: Vec<PeerStream>,
     /// Whether the client has left, once its stream has ended: otherwise this node stops.
     client_left: Arc<AtomicBool>,
@@ -61,11 +65,15 @@ pub(super) struct RemoteSeats {
     given_back: mpsc::Receiver<(u32, Box<Parked>)>,
 }
 
+/// An input for another node, with its memory if a client has sent it.
+type WaitingInput = (PlayInput, Option<Permit>);
+
 /// A stream to another node.
 struct PeerStream {
     endpoint: Arc<str>,
     /// `None` once the client's stream has ended.
-    inputs: Option<mpsc::Sender<PlayInput>>,
+    inputs: Option<mpsc::Sender<WaitingInput>>,
+    waiting: WaitingMemory,
     shared: Arc<Shared>,
     receiving: AbortOnDropHandle<()>,
 }
@@ -149,7 +157,7 @@ struct Handover {
     clock: Arc<ProcessClock>,
     /// The time that this process had run.
     at: OnceLock<Duration>,
-    inputs: mpsc::WeakSender<PlayInput>,
+    inputs: mpsc::WeakSender<WaitingInput>,
 }
 
 impl OnHandover for Handover {
@@ -161,22 +169,29 @@ impl OnHandover for Handover {
                 handle: self.handle,
                 decision_id: self.decision_id,
             };
-            let _ = inputs.try_send(PlayInput {
+            let input = PlayInput {
                 input: Some(Input::HandedOver(handed_over)),
                 elapsed_us: None,
-            });
+            };
+            let _ = inputs.try_send((input, None));
         }
     }
 }
 
 impl RemoteSeats {
     /// No seats yet, for the client whose stream has this outbox.
-    pub(super) fn new(gateway: Gateway, outbox: &Arc<Outbox>, clock: &Arc<ProcessClock>) -> Self {
+    pub(super) fn new(
+        gateway: Gateway,
+        outbox: &Arc<Outbox>,
+        clock: &Arc<ProcessClock>,
+        waiting: WaitingMemory,
+    ) -> Self {
         let (give_back, given_back) = mpsc::channel(MAX_SEATS_PER_STREAM);
         Self {
             gateway,
             outbox: Arc::clone(outbox),
             clock: Arc::clone(clock),
+            waiting,
             streams: Vec::new(),
             client_left: Arc::default(),
             give_back,
@@ -359,7 +374,7 @@ impl RemoteSeats {
             let first_assigned_handle = std::mem::take(&mut first_assigned_handle);
             let is_first = first_assigned_handle > 0;
             PlayRequest {
-                inputs,
+                inputs: inputs.into_iter().map(|(input, _)| input).collect(),
                 first_assigned_handle,
                 answers_contested: is_first,
                 announces_left: is_first,
@@ -382,6 +397,7 @@ impl RemoteSeats {
         PeerStream {
             endpoint: Arc::clone(&elsewhere.peer.endpoint),
             inputs: Some(inputs),
+            waiting: self.waiting.clone(),
             shared,
             receiving: AbortOnDropHandle::new(tokio::spawn(named(
                 LongTask::PeerStream,
@@ -429,11 +445,13 @@ impl PeerStream {
         elapsed_us: Option<u64>,
     ) -> Result<(), NodeGone> {
         let inputs = self.inputs.as_ref().ok_or(NodeGone)?;
+        let memory = self.waiting.take(command.encoded_len()).await;
         let input = PlayInput {
             input: Some(Input::Command(command)),
             elapsed_us,
         };
-        inputs.send(input).await.map_err(|_| NodeGone)
+        let sent = inputs.send((input, Some(memory))).await;
+        sent.map_err(|_| NodeGone)
     }
 
     /// When the client's transport took the request for a decision, in time that the process has run.
@@ -450,7 +468,7 @@ impl PeerStream {
 struct Receiver {
     shared: Arc<Shared>,
     clock: Arc<ProcessClock>,
-    inputs: mpsc::WeakSender<PlayInput>,
+    inputs: mpsc::WeakSender<WaitingInput>,
     outbox: Arc<Outbox>,
     space: Arc<Space>,
 }
@@ -513,7 +531,7 @@ impl Receiver {
                 elapsed_us: None,
             };
             // If the stream has ended, so does the client's.
-            let _ = inputs.send(still_open).await;
+            let _ = inputs.send((still_open, None)).await;
         }
     }
 

@@ -9,7 +9,7 @@ use tonic::{Code, Status};
 
 use super::reader::{Reader, Requests};
 use crate::grpc::status::status;
-use chefshat_hosting::config::{MAX_COMMANDS_CONTESTED, MAX_COMMANDS_PER_MESSAGE};
+use chefshat_hosting::config::MAX_COMMANDS_PER_MESSAGE;
 use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_room::Answer;
 use chefshat_wire::convert;
@@ -52,10 +52,8 @@ impl Requests for PlayRequest {
         {
             tokio::task::consume_budget().await;
             if let Some(Input::Command(command)) = &mut input
-                && let Some(held_back) = reader.held_back(command.handle)
-                && held_back.len() < MAX_COMMANDS_CONTESTED
+                && reader.hold_back(command, arrived)
             {
-                held_back.push((command.command.take(), arrived));
                 continue;
             }
             match input {
