@@ -28,6 +28,7 @@ use super::deadline::deadline;
 use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
+use crate::connections::STALLED_LIMIT;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Payer, Queued, Refused, SLICE, WorkQueue};
 use chefshat_base::tasks::short;
@@ -178,7 +179,6 @@ impl AnalysisService for Analyses {
         let (responses, stream) = mpsc::channel(1);
         let service = self.clone();
         tokio::spawn(short("one call", async move {
-            let _held = held;
             let updates = responses.clone();
             // A client that reads slowly misses some.
             let update = move |so_far| drop(updates.try_send(Ok(so_far)));
@@ -186,8 +186,9 @@ impl AnalysisService for Analyses {
                 answer = service.run(analysis, queued, update) => answer,
                 () = responses.closed() => return,
             };
-            // It fails only if the client has gone.
-            let _ = responses.send(answer).await;
+            // A client that does not read the answer holds up no other analysis.
+            drop(held);
+            let _ = responses.send_timeout(answer, STALLED_LIMIT).await;
         }));
         Ok(Response::new(ReceiverStream::new(stream)))
     }

@@ -85,7 +85,8 @@ impl Lookup {
         caller: Key,
     ) -> Result<Option<Arc<TournamentHandle>>, Status> {
         let found_by = found_by.into();
-        if let Some(handle) = self.tournament_in_memory(&found_by) {
+        let runs = |it: &Arc<TournamentHandle>| it.is_over() || !it.is_stopped();
+        if let Some(handle) = self.tournament_in_memory(&found_by).filter(runs) {
             return Ok(Some(handle));
         }
         let is_known = || self.room_in_memory(&found_by).is_some();
@@ -209,6 +210,10 @@ impl Lookup {
         if header.policy.visibility == Visibility::Private
             && self.standing_in_room(caller, &handle, &header).await == Relation::Stranger
         {
+            // One that does not exist is looked for at other nodes: this takes as long, and fails as that
+            // does.
+            self.check_not_elsewhere(&FoundBy::from(id), Key::of_caller(caller), || true)
+                .await?;
             return Err(unknown());
         }
         check(caller, |caller| reaches(caller, &header))?;
@@ -262,7 +267,7 @@ impl Lookup {
     /// Whether the room or tournament of a ticket is in memory and runs, so that finding it takes no
     /// time.
     pub(super) fn has_in_memory(&self, id: UnitId) -> bool {
-        self.tournaments.by_unit(id).is_some()
+        (self.tournaments.by_unit(id)).is_some_and(|it| it.is_over() || !it.is_stopped())
             || self.rooms.by_unit(id).is_some_and(|room| !room.is_gone())
     }
 

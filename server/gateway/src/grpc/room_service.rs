@@ -2,17 +2,19 @@
 
 use std::pin::pin;
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_proto::v1::{
     self, room_service_client::RoomServiceClient, room_service_server::RoomService,
 };
 use chefshat_record::convert::{FieldProblem, seat_number};
 use futures::{Stream, StreamExt as _};
+use tokio::time::{Instant, timeout};
 use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
 use super::forward::Gateway;
-use super::limits::charged;
+use super::limits::{charged, make_way};
 use super::lists::{self, Listing, Page, Part};
 use super::lookup::Lookup;
 use super::new_room::new_room;
@@ -35,6 +37,10 @@ const ROOMS_LOOKED_AT: usize = 200;
 
 /// Rooms that describe themselves at a time.
 const ROOMS_ASKED: usize = 32;
+/// How long the rooms of a page are waited for.
+const LIST_PATIENCE: Duration = Duration::from_secs(2);
+/// How long one is waited for when that is over.
+const LEAST_PATIENCE: Duration = Duration::from_millis(100);
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -129,11 +135,21 @@ impl Listing for RoomList<'_> {
         let looked_at = (self.lookup.rooms()).newest(before, self.over, ROOMS_LOOKED_AT);
         let mut more = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
+        let began = Instant::now();
+        // A room that waits for its commit is left out, so that it holds up no list. The first ones are
+        // waited for longer.
         let describe = |handle: Handle| async move {
-            match self.lookup.lists_room(self.caller, &handle).await {
-                true => handle.describe().await.ok(),
-                false => None,
-            }
+            let patience = LIST_PATIENCE.saturating_sub(began.elapsed());
+            let described = async {
+                match self.lookup.lists_room(self.caller, &handle).await {
+                    true => handle.describe().await.ok(),
+                    false => None,
+                }
+            };
+            timeout(patience.max(LEAST_PATIENCE), described)
+                .await
+                .ok()
+                .flatten()
         };
         let mut entries = Vec::new();
         let mut rooms = pin!(described(looked_at, describe));
@@ -255,6 +271,8 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        // Nor does who waits for a room that waits for its commit.
+        make_way(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
             "" => self.lookup().room(&caller, &request.room_id).await?,
@@ -275,6 +293,8 @@ impl RoomService for RoomCalls {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let (_, extensions, message) = request.into_parts();
+        // Who waits for a turn holds up no other calls.
+        make_way(&extensions);
         let _turn = self.calls.list(key).await;
         let over = match v1::RoomState::try_from(message.state) {
             Ok(v1::RoomState::Unspecified) => None,

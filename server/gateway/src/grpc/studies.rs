@@ -23,7 +23,7 @@ use tonic::{Code, Request, Response, Status};
 
 use super::follow::{self, send};
 use super::forward::Gateway;
-use super::limits::charged;
+use super::limits::{charged, make_way};
 use super::lists;
 use super::lookup::Lookup;
 use super::status::{
@@ -206,6 +206,8 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::ListStudiesResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let gateway = request.extensions().get::<Gateway>().cloned();
+        // Who waits for a turn holds up no other calls.
+        make_way(request.extensions());
         // The settings of many studies are large.
         let _turn = self.calls.list(charged(request.extensions())).await;
         let request = request.into_inner();
