@@ -364,7 +364,7 @@ impl Access {
                 open_noted = true;
                 warn!("the server has tokens but requires none until it is restarted");
             }
-            self.end_expired(since_epoch_ms());
+            self.follow_expiry(since_epoch_ms());
         }
     }
 
@@ -423,11 +423,24 @@ impl Access {
         }
     }
 
-    fn end_expired(&self, now_ms: u64) {
-        for (id, Known { token, ended }) in self.known().iter() {
-            if token.is_expired(now_ms) && !ended.is_cancelled() {
+    /// Ends what expired tokens have started. A token that is valid again, because the clock was ahead,
+    /// starts anew.
+    fn follow_expiry(&self, now_ms: u64) {
+        let differs = |it: &Known| it.token.is_expired(now_ms) != it.ended.is_cancelled();
+        if !self.known().values().any(differs) {
+            return;
+        }
+        let mut known = self
+            .known
+            .write()
+            .expect("no code that holds this lock can panic");
+        for (id, it) in known.iter_mut().filter(|(_, it)| differs(it)) {
+            if it.ended.is_cancelled() {
+                info!(token = %id, "a token that had expired is valid: the clock was ahead");
+                it.ended = CancellationToken::new();
+            } else {
                 info!(token = %id, "a token has expired");
-                ended.cancel();
+                it.ended.cancel();
             }
         }
     }
@@ -641,13 +654,26 @@ mod tests {
         setup.access.read_if_changed();
         assert!(first.signal().is_cancelled());
         assert_eq!(first.refusal(), Refusal::TokenUnknown);
-        setup.access.end_expired(since_epoch_ms());
+        setup.access.follow_expiry(since_epoch_ms());
         assert!(!second.signal().is_cancelled());
-        setup.access.end_expired(since_epoch_ms() + 60_000);
+        setup.access.follow_expiry(since_epoch_ms() + 60_000);
         assert!(second.signal().is_cancelled());
         assert!(!third.signal().is_cancelled());
         let refused = setup.check("PlayService/Play", Some(&revoked)).map(|_| ());
         assert_eq!(refused, Err(Refusal::TokenUnknown));
+    }
+
+    #[test]
+    fn a_token_is_valid_again_when_a_clock_that_was_ahead_is_corrected() {
+        let setup = Setup::new(&required());
+        let token = setup.add(Role::Player, None, Some(Duration::from_secs(60)));
+        setup.access.follow_expiry(since_epoch_ms() + 60_000);
+        setup.access.follow_expiry(since_epoch_ms());
+        let granted = setup
+            .check("PlayService/Play", Some(&token))
+            .expect("valid");
+        let ended = granted.ended.expect("with a token");
+        assert!(!ended.signal().is_cancelled());
     }
 
     #[test]
