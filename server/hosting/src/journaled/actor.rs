@@ -34,6 +34,11 @@ pub(super) async fn run<U: Journaled>(
     if let Err(error) = run_on(&mut unit, &mut inbox, stop).await {
         fail(&mut unit, &error);
     }
+    // Whoever sends more learns that the task has ended; whoever has sent something, here.
+    inbox.close();
+    while let Ok(message) = inbox.try_recv() {
+        unit.abandon(message);
+    }
 }
 
 async fn run_on<U: Journaled>(
@@ -67,8 +72,12 @@ async fn run_on<U: Journaled>(
                 if received == 0 {
                     return Ok(());
                 }
-                for message in messages.drain(..) {
-                    unit.receive(message).await?;
+                let mut received = std::mem::take(&mut messages).into_iter();
+                while let Some(message) = received.next() {
+                    if let Err(error) = unit.receive(message).await {
+                        received.for_each(|message| unit.abandon(message));
+                        return Err(error);
+                    }
                 }
             }
             () = games.notified() => {}

@@ -103,6 +103,9 @@ pub trait Journaled: Sized + Send + Sync + 'static {
         &mut self,
         message: Self::Message,
     ) -> impl Future<Output = Result<(), StoreError>> + Send;
+    /// Gives up what a message brings that comes when the task has ended. By default, dropping it does.
+    fn abandon(&mut self, _message: Self::Message) {}
+
     /// Adds the entries that follow now by themselves. Not called once the server stops.
     fn follow(&mut self) -> impl Future<Output = Result<(), StoreError>> + Send;
     /// Announces committed entries, which the handle shows by now.

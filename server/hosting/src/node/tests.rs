@@ -9,6 +9,7 @@ use chefshat_room::ids::{Id, RoomId, TournamentId};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{Durability, Policy};
 use futures::FutureExt as _;
+use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 
@@ -16,16 +17,17 @@ use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, Hosted, LEFT_ALONE, LEFT_TO_NEXT};
 use crate::cluster::{FoundBy, LOOK_LIMIT, Location, NodeLease, StoreDirectory, UnitEvent};
 use crate::config::ServerConfig;
-use crate::room::{Handle, JoinRequest, RoomError, RoomGone};
+use crate::room::{Handle, JoinRequest, RoomError, RoomGone, Supersedes};
 use crate::rooms::{CreateError, NewRoom, Rooms};
 use crate::studies::Studies;
-use crate::tournaments::{Entry, TournamentHandle, Tournaments};
+use crate::tournaments::{Connection, Entry, TournamentHandle, Tournaments};
 use chefshat_admission::limits::Key;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_store::Store;
 use chefshat_store::cluster::{ClusterStore, NodeInfo, Subject};
 use chefshat_store::testing::{Database, FakeStore};
 use chefshat_wire::convert;
+use chefshat_wire::outbox::Outbox;
 
 /// Longest time that anything takes, on the paused clock.
 const SOON: Duration = Duration::from_secs(60);
@@ -752,6 +754,57 @@ async fn a_tournament_changes_hands_with_its_rooms() {
     first.loses(room).await;
     assert!(first.tournaments.get(old.id()).is_none());
     assert_eq!(second.rooms.open_count(), 1, "no game is played twice");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_participant_who_comes_when_its_tournament_stops_reconnects() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let settings = v1::TournamentSettings {
+        format: v1::TournamentFormat::Swiss.into(),
+        ..Default::default()
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let made = (first.tournaments).create("Coppa", plan, None, Key::Local);
+    let (old, _) = made.await.expect("made");
+    let entry = |name: &str| Entry {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind: ParticipantKind::Agent,
+        max_games: 1,
+        stateless: false,
+        at_table: false,
+        request_id: None,
+    };
+    let (ada, ticket) = soon(old.join(entry("Ada"))).await.expect("joined");
+    // Its task waits for a commit, and reads nothing more.
+    first.store.cut_off.send_replace(true);
+    let late = tokio::spawn({
+        let (old, entry) = (Arc::clone(&old), entry("Bo"));
+        async move { old.join(entry).await.is_ok() }
+    });
+    tokio::task::yield_now().await;
+    let (outbox, _updates) = Outbox::new();
+    let (calls, _called) = mpsc::channel(1);
+    let connection = Connection {
+        handle: 0,
+        calls,
+        outbox: Arc::clone(&outbox),
+        supersedes: Supersedes::Any,
+    };
+    soon(old.enter(ada, &ticket, 1, connection)).await;
+
+    let new = second.has_tournament(old.id()).await;
+    assert_eq!(new.describe().participants.len(), 1);
+    first.store.cut_off.send_replace(false);
+    assert!(!soon(late).await.expect("no panic"));
+    let ended = async {
+        while outbox.is_open() {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(ended).await;
 }
 
 #[tokio::test(start_paused = true)]

@@ -261,6 +261,13 @@ impl Journaled for TournamentTask {
             .min()
     }
 
+    fn abandon(&mut self, message: Message) {
+        if let Message::Enter(participant, _, number, connection) = message {
+            self.connections.insert(participant, (number, connection));
+            self.end_streams();
+        }
+    }
+
     /// They may reconnect, unless the whole server ends.
     fn end_streams(&mut self) {
         if self.unit.rooms.lease().is_none() {
