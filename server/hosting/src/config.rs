@@ -25,6 +25,10 @@ pub const MAX_SEATS_PER_WATCH: usize = 64;
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 /// Most commands of a seat that wait for its attachment while another stream has it.
 pub const MAX_COMMANDS_CONTESTED: usize = 64;
+/// Games that are deleted in one commit: rooms wait for it.
+pub const GAMES_DELETED_AT_ONCE: usize = 16;
+/// Pause between two such commits, in which rooms commit.
+pub const DELETION_PAUSE: Duration = Duration::from_millis(20);
 /// How long a Play stream may stay silent before its first message.
 pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Longest time until a picture of a game is sent.

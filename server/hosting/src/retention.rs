@@ -12,16 +12,12 @@ use chefshat_record::{atomic_file, jsonl};
 use chefshat_room::ids::GameId;
 use tracing::{error, info, warn};
 
-use crate::config::KeepGames;
+use crate::config::{DELETION_PAUSE, GAMES_DELETED_AT_ONCE, KeepGames};
 use crate::rooms::Rooms;
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_store::samples::Undeleted;
 use chefshat_store::{DiskUsage, Keep, StoreError};
 
-/// Games that are deleted in one commit: rooms wait for it.
-const GAMES_PER_COMMIT: usize = 16;
-/// Pause between two commits, in which rooms commit.
-const PAUSE: Duration = Duration::from_millis(20);
 /// Time between two runs of the schedule.
 const INTERVAL: Duration = Duration::from_secs(600);
 
@@ -110,12 +106,12 @@ impl Retention {
         let mut after = 0;
         loop {
             let store = self.rooms.store();
-            let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
+            let found = store.prunable(keep, after, GAMES_DELETED_AT_ONCE).await?;
             let Some((last, _)) = found.last() else { break };
             after = *last;
             let games: Vec<GameId> = found.into_iter().map(|(_, game)| game).collect();
             pruned.games += self.delete(games).await?;
-            tokio::time::sleep(PAUSE).await;
+            tokio::time::sleep(DELETION_PAUSE).await;
         }
         let after = self.usage().await?;
         let bytes = |usage: &Usage| usage.disk.bytes + usage.record_bytes;

@@ -16,10 +16,11 @@ use std::time::Duration;
 use chefshat_record::signature::PublicKey;
 use rayon::ThreadPoolBuildError;
 use tokio::sync::Notify;
+use tokio::time::sleep;
 use tokio_util::task::TaskTracker;
 
 use crate::cluster::{Directory, NodeLease, SingleServer};
-use crate::config::ServerConfig;
+use crate::config::{DELETION_PAUSE, GAMES_DELETED_AT_ONCE, ServerConfig};
 use crate::record_writer::RecordWriter;
 use crate::room::{GameEnd, Handle, RoomWatcher, TaskContext};
 use crate::signing::Signer;
@@ -165,7 +166,12 @@ impl Rooms {
     pub async fn delete_games(&self, mut games: Vec<GameId>) -> Result<Undeleted, StoreError> {
         let undeleted = self.delete_samples(&games).await?;
         games.retain(|game| !undeleted.contains_key(game));
-        self.context.store.delete(games).await?;
+        for (number, games) in games.chunks(GAMES_DELETED_AT_ONCE).enumerate() {
+            if number > 0 {
+                sleep(DELETION_PAUSE).await;
+            }
+            self.context.store.delete(games.to_vec()).await?;
+        }
         Ok(undeleted)
     }
 

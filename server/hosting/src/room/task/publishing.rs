@@ -28,6 +28,8 @@ impl Room {
         if request.snapshot && policy.spectator_delay_decisions > 0 {
             return Err(SpectateError::SnapshotDelayed);
         }
+        // The places of those who have left are free.
+        self.spectators.retain(|it| !it.is_abandoned());
         let place = (self.spectator_places.try_take(request.charged)).ok_or(SpectateError::Full)?;
         let spectator = Subscriber::spectator(
             &self.core,
