@@ -97,7 +97,7 @@ impl<K: Ord + Copy, E> Tables<K, E> {
     pub fn beat(&mut self, node: NodeId, now_ms: u64) -> bool {
         match self.nodes.get_mut(&node) {
             Some(beat) => {
-                *beat = now_ms.max(*beat);
+                *beat = now_ms;
                 true
             }
             None => false,

@@ -247,6 +247,7 @@ impl Units {
             Ok(()) => true,
             Err(error) => {
                 warn!(%unit, %error, "a room or tournament cannot be released");
+                sleep(RETRY).await;
                 false
             }
         }

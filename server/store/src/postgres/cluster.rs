@@ -164,7 +164,7 @@ impl ClusterStore for PostgresStore {
             async move {
                 let mut transaction = connection.begin().await?;
                 let drain: Option<bool> = sqlx::query_scalar(
-                    "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4,
+                    "UPDATE nodes SET beat_ms = clock_ms(), reached = $2, rooms = $3, drain = drain OR $4,
                             unreachable = $5, stalled = $6
                      WHERE node = $1 RETURNING drain",
                 )
