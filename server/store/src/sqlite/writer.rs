@@ -34,8 +34,6 @@ use chefshat_room::ids::GameId;
 pub(super) const QUEUE: usize = 1_024;
 /// Most commands in one transaction.
 const MAX_COMMANDS_PER_TRANSACTION: usize = 1_024;
-/// Most commands that wait for space on a full disk, where deletions among them go first.
-const MAX_WAITING: usize = 4 * QUEUE;
 /// Unused pages that are given back to the disk with each deletion of games.
 const FREED_PAGES: u32 = 2_048;
 /// Numbers of rows that one statement inserts. There are only these, so that few statements need to
@@ -204,7 +202,9 @@ fn send_replies(pending: &mut Vec<Pending>, committed: &Result<Taken, StoreError
     }
 }
 
-/// Commits commands, as soon as there is space for them on the disk. Meanwhile more of them arrive.
+/// Commits commands, as soon as there is space for them on the disk. Meanwhile it takes all that
+/// arrive, since a deletion may be behind the others. The numbers of rooms, tournaments and studies
+/// bound them: each waits for its command before it sends the next, and a full disk refuses new ones.
 async fn commit_with_space(
     connection: &mut SqliteConnection,
     pending: &mut Vec<Pending>,
@@ -222,9 +222,7 @@ async fn commit_with_space(
             }
             Err(cause) if space.explains(&cause) => {
                 *last_listed = listed_before;
-                while pending.len() < MAX_WAITING
-                    && let Ok(next) = commands.try_recv()
-                {
+                while let Ok(next) = commands.try_recv() {
                     pending.push(next);
                 }
                 if !delete_first(connection, pending, space).await? && !space.wait(began).await {
