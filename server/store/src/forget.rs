@@ -1,9 +1,10 @@
-//! Removes a participant's name from stored games and tournaments: what becomes of each row. A
-//! store reads the rows and writes those that change; games and tournaments that are over change in
-//! no other way. Files of records and studies are not handled here.
+//! Removes a participant's name from stored games and tournaments: in which order, and what becomes of
+//! each row. A database reads the rows and writes those that change; games and tournaments that are
+//! over change in no other way. Files of records and studies are not handled here.
 
 use std::sync::Arc;
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_record::outcome::without_comments;
@@ -12,11 +13,121 @@ use chefshat_record::signature::SigningKey;
 use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 
+use super::decode_pool::DecodePool;
 use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
-use super::{ForgetError, Forgotten, StoredGame};
+use super::{ForgetError, Forgotten, StoreError, StoredGame};
 use chefshat_room::ids::GameId;
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, StudyGame};
+
+/// Most games and tournaments that one transaction rewrites. What rooms commit meanwhile waits for it.
+pub(super) const MAX_REWRITTEN_AT_ONCE: usize = 64;
+/// Bytes of rewritten rows after which a transaction is committed, however few games they are of.
+const ENOUGH_BYTES: usize = 1024 * 1024;
+
+/// A database from which a participant is removed.
+#[async_trait]
+pub(super) trait Rewritable: Sync {
+    /// The numbers of the games that may contain a name.
+    async fn games_with(&self, name: &str) -> Result<Vec<i64>, StoreError>;
+    /// The numbers of the tournaments that may contain a name.
+    async fn tournaments_with(&self, name: &str) -> Result<Vec<i64>, StoreError>;
+    /// The rows of a game; `None` if it was deleted.
+    async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError>;
+    /// The rows of a tournament's journal by their positions, in order.
+    async fn tournament_rows(&self, number: i64) -> Result<Vec<(i64, Vec<u8>)>, StoreError>;
+    /// Writes what changes in one transaction.
+    async fn write(&self, rewrite: Rewrite) -> Result<(), StoreError>;
+    /// Where games are decoded.
+    fn decoding(&self) -> &DecodePool;
+}
+
+/// Removes a participant from a database, in transactions of bounded size. A game or tournament has
+/// either all of the name or nothing of it, so what was interrupted is completed by doing it again.
+///
+/// # Errors
+/// See [`ForgetError`].
+pub(super) async fn forget_participant(
+    database: &impl Rewritable,
+    who: &Pseudonym,
+) -> Result<Forgotten, ForgetError> {
+    let mut forgotten = Forgotten::default();
+    let mut rewrite = Rewrite::new(who);
+    for stored in find(database, who).await? {
+        rewrite = add(database, rewrite, stored).await?;
+        if rewrite.is_large() {
+            let large = std::mem::replace(&mut rewrite, Rewrite::new(who));
+            commit(database, large, &mut forgotten).await?;
+        }
+    }
+    commit(database, rewrite, &mut forgotten).await?;
+    Ok(forgotten)
+}
+
+/// A stored game or tournament, by its number.
+#[derive(Clone, Copy)]
+enum Stored {
+    Game(i64),
+    Tournament(i64),
+}
+
+/// The games and tournaments that the participant is in. Everything is read once before anything is
+/// changed, since what is not over or cannot be read refuses the removal.
+async fn find(database: &impl Rewritable, who: &Pseudonym) -> Result<Vec<Stored>, ForgetError> {
+    let name = who.of.name.as_str();
+    let games = database.games_with(name).await?.into_iter();
+    let tournaments = database.tournaments_with(name).await?.into_iter();
+    // Nothing is signed yet.
+    let unsigned = Pseudonym {
+        key: None,
+        ..who.clone()
+    };
+    let mut found = Vec::new();
+    for stored in (games.map(Stored::Game)).chain(tournaments.map(Stored::Tournament)) {
+        let rewrite = add(database, Rewrite::new(&unsigned), stored).await?;
+        if !rewrite.is_empty() {
+            found.push(stored);
+        }
+    }
+    Ok(found)
+}
+
+/// Adds a game or tournament to what is written, if the participant is in it.
+async fn add(
+    database: &impl Rewritable,
+    rewrite: Rewrite,
+    stored: Stored,
+) -> Result<Rewrite, ForgetError> {
+    match stored {
+        Stored::Game(number) => {
+            let Some(rows) = database.game_rows(number).await? else {
+                return Ok(rewrite);
+            };
+            let bytes = bytes_of(&rows.journal) + rows.record.as_ref().map_or(0, Vec::len);
+            let redacting = (database.decoding()).run(bytes / 64, move || rewrite.with_game(rows));
+            redacting.await?
+        }
+        Stored::Tournament(number) => {
+            let rows = database.tournament_rows(number).await?;
+            rewrite.with_tournament(number, rows)
+        }
+    }
+}
+
+/// Writes what changes, and counts it.
+async fn commit(
+    database: &impl Rewritable,
+    rewrite: Rewrite,
+    forgotten: &mut Forgotten,
+) -> Result<(), StoreError> {
+    if rewrite.is_empty() {
+        return Ok(());
+    }
+    let written = rewrite.forgotten.clone();
+    database.write(rewrite).await?;
+    forgotten.append(written);
+    Ok(())
+}
 
 /// The rows of a game that may contain the name.
 #[derive(Debug)]
@@ -57,31 +168,44 @@ pub(super) struct TournamentRewrite {
     pub(super) rows: Vec<(i64, Vec<u8>)>,
 }
 
-/// What a store writes to remove a participant.
+/// What one transaction writes to remove a participant.
 #[derive(Debug)]
 pub(super) struct Rewrite {
     pub(super) who: Pseudonym,
     pub(super) games: Vec<GameRewrite>,
     pub(super) tournaments: Vec<TournamentRewrite>,
-    pub(super) forgotten: Forgotten,
+    /// Bytes of all rows in them.
+    bytes: usize,
+    forgotten: Forgotten,
 }
 
 impl Rewrite {
     /// Nothing yet.
-    pub(super) fn new(who: &Pseudonym) -> Self {
+    fn new(who: &Pseudonym) -> Self {
         Self {
             who: who.clone(),
             games: Vec::new(),
             tournaments: Vec::new(),
+            bytes: 0,
             forgotten: Forgotten::default(),
         }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.games.is_empty() && self.tournaments.is_empty()
+    }
+
+    /// Whether it is enough for one transaction.
+    fn is_large(&self) -> bool {
+        self.games.len() + self.tournaments.len() >= MAX_REWRITTEN_AT_ONCE
+            || self.bytes >= ENOUGH_BYTES
     }
 
     /// Adds a game, if the participant is in it.
     ///
     /// # Errors
     /// The game is not over, or cannot be read.
-    pub(super) fn with_game(mut self, rows: GameRows) -> Result<Self, ForgetError> {
+    fn with_game(mut self, rows: GameRows) -> Result<Self, ForgetError> {
         let (id, is_filed, is_running) = (rows.id, rows.is_filed, rows.is_running);
         let rewritten = rewrite_game(rows, &self.who).map_err(|problem| unreadable(id, problem))?;
         let Some((game, redactions)) = rewritten else {
@@ -90,6 +214,7 @@ impl Rewrite {
         if is_running {
             return Err(ForgetError::GameRunning(self.who.of.name));
         }
+        self.bytes += game.bytes();
         self.games.push(game);
         self.forgotten.add(id, is_filed, redactions);
         Ok(self)
@@ -99,7 +224,7 @@ impl Rewrite {
     ///
     /// # Errors
     /// The tournament is not over, or cannot be read.
-    pub(super) fn with_tournament(
+    fn with_tournament(
         mut self,
         number: i64,
         rows: Vec<(i64, Vec<u8>)>,
@@ -124,12 +249,33 @@ impl Rewrite {
         }
         self.forgotten.tournaments += 1;
         let rows = changed;
+        self.bytes += bytes_of(&rows);
         self.tournaments.push(TournamentRewrite { number, rows });
         Ok(self)
     }
 }
 
+impl GameRewrite {
+    /// Bytes of its rows.
+    fn bytes(&self) -> usize {
+        let summary = self.summary.as_ref().map_or(0, |(bytes, _)| bytes.len());
+        let others = [&self.header, &self.record].into_iter().flatten();
+        bytes_of(&self.journal) + summary + others.map(Vec::len).sum::<usize>()
+    }
+}
+
+fn bytes_of(rows: &[(i64, Vec<u8>)]) -> usize {
+    rows.iter().map(|(_, bytes)| bytes.len()).sum()
+}
+
 impl Forgotten {
+    fn append(&mut self, mut more: Self) {
+        self.games.append(&mut more.games);
+        self.filed.append(&mut more.filed);
+        self.tournaments += more.tournaments;
+        self.redactions += more.redactions;
+    }
+
     pub(super) fn add(&mut self, game: GameId, is_filed: bool, redactions: Redactions) {
         self.games.push(game);
         self.filed.extend(is_filed.then_some(game));

@@ -200,7 +200,7 @@ pub struct Forgotten {
     pub redactions: Redactions,
 }
 
-/// Why a participant cannot be removed; nothing was changed.
+/// Why a participant cannot be removed. Nothing was changed, unless the store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ForgetError {
     /// A game with the name is not over.
@@ -309,9 +309,10 @@ pub trait Store: Send + Sync + 'static {
         Ok(())
     }
     /// Replaces the name of a participant in all games and tournaments by a pseudonym, and deletes
-    /// its expressions and annotations, in one commit. Changed records lose their signature and
-    /// count as not written to files. What contains the name and is not over refuses it. A store
-    /// that cannot forget fails.
+    /// its expressions and annotations. Changed records lose their signature and count as not
+    /// written to files. What contains the name and is not over refuses it. If the store fails
+    /// meanwhile, some games and tournaments have changed, each of them completely: doing it again
+    /// completes it. A store that cannot forget fails.
     async fn forget(&self, _who: &Pseudonym) -> Result<Forgotten, ForgetError> {
         let failure = StoreError::Failed("this store cannot remove participants".to_owned());
         Err(failure.into())

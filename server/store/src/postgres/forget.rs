@@ -1,95 +1,19 @@
-//! Removing a participant from the database: reads what contains the name, and writes what changes
-//! in one transaction. `store::forget` decides what changes.
+//! Removing a participant from the database: writes what changes, with one statement for each table: a
+//! transaction must end in time, however far away the database is. `forgetting` reads what contains the
+//! name, and `store::forget` decides what changes.
 
-use chefshat_record::pseudonym::Pseudonym;
 use futures::FutureExt as _;
-use sqlx::Row as _;
-use sqlx::postgres::{PgConnection, PgRow};
+use sqlx::postgres::PgConnection;
 
 use super::reader::Reader;
 use super::values::text;
-use crate::ForgetError;
 use crate::StoreError;
-use crate::forget::{GameRows, Rewrite};
-use chefshat_room::ids::Id;
+use crate::forget::{GameRewrite, Rewrite, TournamentRewrite};
 
 /// Games whose journals are searched for a name in one read.
-const GAMES_AT_A_TIME: i64 = 1_000;
+pub(super) const GAMES_AT_A_TIME: i64 = 1_000;
 
 impl Reader {
-    /// What removing a participant changes.
-    ///
-    /// # Errors
-    /// See [`ForgetError`].
-    pub(super) async fn forgetting(&self, who: &Pseudonym) -> Result<Rewrite, ForgetError> {
-        let mut rewrite = Rewrite::new(who);
-        for number in self.games_with(&who.of.name).await? {
-            if let Some(rows) = self.game_rows(number).await? {
-                let bytes: usize = rows.journal.iter().map(|(_, bytes)| bytes.len()).sum();
-                let bytes = bytes + rows.record.as_ref().map_or(0, Vec::len);
-                let redacting = self
-                    .decoding
-                    .run(bytes / 64, move || rewrite.with_game(rows));
-                rewrite = redacting.await??;
-            }
-        }
-        let name = who.of.name.as_bytes().to_vec();
-        let tournaments: Vec<i64> = (self.read(|connection| {
-            sqlx::query_scalar(
-                "SELECT DISTINCT tournament FROM tournament_entries WHERE position($1 IN entries) > 0",
-            )
-            .bind(name)
-            .fetch_all(connection)
-            .boxed()
-        }))
-        .await?;
-        for number in tournaments {
-            let rows = self.read(|connection| {
-                sqlx::query_as(
-                    "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-                )
-                .bind(number)
-                .fetch_all(connection)
-                .boxed()
-            });
-            rewrite = rewrite.with_tournament(number, rows.await?)?;
-        }
-        Ok(rewrite)
-    }
-
-    /// The numbers of the games that contain a name.
-    async fn games_with(&self, name: &str) -> Result<Vec<i64>, StoreError> {
-        let last: Option<i64> = (self.read(|connection| {
-            sqlx::query_scalar("SELECT max(number) FROM games")
-                .fetch_one(connection)
-                .boxed()
-        }))
-        .await?;
-        let mut games = Vec::new();
-        let mut after = 0;
-        while after < last.unwrap_or_default() {
-            let (bytes, name) = (name.as_bytes().to_vec(), text(name).into_owned());
-            let found = self.read(|connection| {
-                sqlx::query_scalar(
-                    "SELECT number FROM games WHERE number > $1 AND number <= $2 AND (
-                         number IN (SELECT game FROM participants WHERE name = $3)
-                         OR EXISTS (SELECT FROM journal WHERE game = number AND position($4 IN entries) > 0)
-                         OR EXISTS (SELECT FROM added_records WHERE game = number AND position($4 IN record) > 0))
-                     ORDER BY number",
-                )
-                .bind(after)
-                .bind(after + GAMES_AT_A_TIME)
-                .bind(name)
-                .bind(bytes)
-                .fetch_all(connection)
-                .boxed()
-            });
-            games.append(&mut found.await?);
-            after += GAMES_AT_A_TIME;
-        }
-        Ok(games)
-    }
-
     /// Deletes the rows that contain a name from the journals of games that retention has deleted.
     pub(super) async fn forget_pruned(&self, name: &str) -> Result<(), StoreError> {
         let mut after = 0;
@@ -119,109 +43,131 @@ impl Reader {
             deleting.await?;
         }
     }
-
-    /// The rows of a game; `None` if it was deleted.
-    async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
-        let game: Option<PgRow> = (self.read(|connection| {
-            sqlx::query(
-                "SELECT game_id, state, filed, header, summary, record, signature
-                 FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
-            )
-            .bind(number)
-            .fetch_optional(connection)
-            .boxed()
-        }))
-        .await?;
-        let Some(game) = game else { return Ok(None) };
-        let id: Vec<u8> = game.get(0);
-        let id = id.try_into().map(Id::from_bytes).map_err(|_| {
-            StoreError::Failed(format!("game number {number} has an id that is damaged"))
-        })?;
-        let journal = self.read(|connection| {
-            sqlx::query_as(
-                "SELECT position, entries FROM journal WHERE game = $1 ORDER BY position",
-            )
-            .bind(number)
-            .fetch_all(connection)
-            .boxed()
-        });
-        Ok(Some(GameRows {
-            number,
-            id,
-            is_running: game.get::<i32, _>(1) == 0,
-            is_filed: game.get(2),
-            header: game.get(3),
-            summary: game.get(4),
-            record: game.get(5),
-            signature: game.get(6),
-            journal: journal.await?,
-        }))
-    }
 }
 
 /// Writes what changes. The records of the games count as not written to files.
 pub(super) async fn rewrite(connection: &mut PgConnection, rewrite: &Rewrite) -> sqlx::Result<()> {
-    for game in &rewrite.games {
-        let (positions, entries): (Vec<i64>, Vec<&[u8]>) = (game.journal.iter())
-            .map(|(position, entries)| (*position, entries.as_slice()))
-            .unzip();
-        sqlx::query(
-            "UPDATE journal SET entries = new.entries
-             FROM unnest($2::bigint[], $3::bytea[]) AS new (position, entries)
-             WHERE game = $1 AND journal.position = new.position",
-        )
-        .bind(game.number)
-        .bind(positions)
-        .bind(entries)
-        .execute(&mut *connection)
-        .await?;
-        if let Some(record) = &game.record {
-            sqlx::query("UPDATE added_records SET record = $2 WHERE game = $1")
-                .bind(game.number)
-                .bind(record.as_slice())
-                .execute(&mut *connection)
-                .await?;
+    rewrite_games(connection, &rewrite.games).await?;
+    rewrite_journals(connection, &rewrite.games).await?;
+    rewrite_records(connection, &rewrite.games).await?;
+    rename_seats(connection, &rewrite.games, &rewrite.who.pseudonym).await?;
+    rewrite_tournaments(connection, &rewrite.tournaments).await
+}
+
+async fn rewrite_games(connection: &mut PgConnection, games: &[GameRewrite]) -> sqlx::Result<()> {
+    let summary = |game: &GameRewrite| game.summary.as_ref().map(|(bytes, _)| bytes.clone());
+    let room_name = |game: &GameRewrite| {
+        let summary = game.summary.as_ref();
+        summary.map(|(_, name)| text(name).into_owned())
+    };
+    sqlx::query(
+        "UPDATE games SET header = coalesce(new.header, games.header),
+                          summary = coalesce(new.summary, games.summary),
+                          room_name = coalesce(new.room_name, games.room_name),
+                          signature = new.signature,
+                          filed = false
+         FROM unnest($1::bigint[], $2::bytea[], $3::bytea[], $4::text[], $5::bytea[])
+              AS new (number, header, summary, room_name, signature)
+         WHERE games.number = new.number",
+    )
+    .bind(all(games, |game| game.number))
+    .bind(all(games, |game| game.header.as_deref()))
+    .bind(all(games, summary))
+    .bind(all(games, room_name))
+    .bind(all(games, |game| game.signature.as_deref()))
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+async fn rewrite_journals(
+    connection: &mut PgConnection,
+    games: &[GameRewrite],
+) -> sqlx::Result<()> {
+    let (mut numbers, mut positions, mut all_entries) = (Vec::new(), Vec::new(), Vec::new());
+    for game in games {
+        for (position, entries) in &game.journal {
+            numbers.push(game.number);
+            positions.push(*position);
+            all_entries.push(entries.as_slice());
         }
-        if let Some(header) = &game.header {
-            sqlx::query("UPDATE games SET header = $2 WHERE number = $1")
-                .bind(game.number)
-                .bind(header.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        }
-        if let Some((summary, room_name)) = &game.summary {
-            sqlx::query(
-                "UPDATE games SET summary = $2, room_name = $3, filed = false, signature = $4
-                 WHERE number = $1",
-            )
-            .bind(game.number)
-            .bind(summary.as_slice())
-            .bind(text(room_name))
-            .bind(game.signature.as_deref())
-            .execute(&mut *connection)
-            .await?;
-        }
-        sqlx::query("UPDATE participants SET name = $3 WHERE game = $1 AND seat = ANY($2)")
-            .bind(game.number)
-            .bind(&game.seats)
-            .bind(text(&rewrite.who.pseudonym))
-            .execute(&mut *connection)
-            .await?;
     }
-    for tournament in &rewrite.tournaments {
-        let (positions, entries): (Vec<i64>, Vec<&[u8]>) = (tournament.rows.iter())
-            .map(|(position, entries)| (*position, entries.as_slice()))
-            .unzip();
-        sqlx::query(
-            "UPDATE tournament_entries SET entries = new.entries
-             FROM unnest($2::bigint[], $3::bytea[]) AS new (position, entries)
-             WHERE tournament = $1 AND tournament_entries.position = new.position",
-        )
-        .bind(tournament.number)
-        .bind(positions)
-        .bind(entries)
-        .execute(&mut *connection)
-        .await?;
+    sqlx::query(
+        "UPDATE journal SET entries = new.entries
+         FROM unnest($1::bigint[], $2::bigint[], $3::bytea[]) AS new (game, position, entries)
+         WHERE journal.game = new.game AND journal.position = new.position",
+    )
+    .bind(numbers)
+    .bind(positions)
+    .bind(all_entries)
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+async fn rewrite_records(connection: &mut PgConnection, games: &[GameRewrite]) -> sqlx::Result<()> {
+    let (numbers, records): (Vec<i64>, Vec<&[u8]>) = (games.iter())
+        .filter_map(|game| Some((game.number, game.record.as_deref()?)))
+        .unzip();
+    sqlx::query(
+        "UPDATE added_records SET record = new.record
+         FROM unnest($1::bigint[], $2::bytea[]) AS new (game, record)
+         WHERE added_records.game = new.game",
+    )
+    .bind(numbers)
+    .bind(records)
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+async fn rename_seats(
+    connection: &mut PgConnection,
+    games: &[GameRewrite],
+    pseudonym: &str,
+) -> sqlx::Result<()> {
+    let (numbers, seats): (Vec<i64>, Vec<i64>) = (games.iter())
+        .flat_map(|game| game.seats.iter().map(|seat| (game.number, *seat)))
+        .unzip();
+    sqlx::query(
+        "UPDATE participants SET name = $3
+         FROM unnest($1::bigint[], $2::bigint[]) AS own (game, seat)
+         WHERE participants.game = own.game AND participants.seat = own.seat",
+    )
+    .bind(numbers)
+    .bind(seats)
+    .bind(text(pseudonym))
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+async fn rewrite_tournaments(
+    connection: &mut PgConnection,
+    tournaments: &[TournamentRewrite],
+) -> sqlx::Result<()> {
+    let (mut numbers, mut positions, mut all_entries) = (Vec::new(), Vec::new(), Vec::new());
+    for tournament in tournaments {
+        for (position, entries) in &tournament.rows {
+            numbers.push(tournament.number);
+            positions.push(*position);
+            all_entries.push(entries.as_slice());
+        }
     }
-    Ok(())
+    sqlx::query(
+        "UPDATE tournament_entries SET entries = new.entries
+         FROM unnest($1::bigint[], $2::bigint[], $3::bytea[]) AS new (tournament, position, entries)
+         WHERE tournament_entries.tournament = new.tournament
+           AND tournament_entries.position = new.position",
+    )
+    .bind(numbers)
+    .bind(positions)
+    .bind(all_entries)
+    .execute(connection)
+    .await
+    .map(drop)
+}
+
+fn all<'g, T>(games: &'g [GameRewrite], value: impl Fn(&'g GameRewrite) -> T) -> Vec<T> {
+    games.iter().map(value).collect()
 }

@@ -11,6 +11,7 @@ mod commands;
 mod ends;
 mod errors;
 mod forget;
+mod forgetting;
 mod handover;
 mod journals;
 mod open;
@@ -47,6 +48,7 @@ pub use transfer::{TransferError, Transferred, transfer};
 
 use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Scratch};
+use super::forget::forget_participant;
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use super::{
@@ -415,10 +417,7 @@ impl Store for PostgresStore {
     }
 
     async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
-        let rewrite = self.reader.forgetting(who).await?;
-        let forgotten = rewrite.forgotten.clone();
-        let rewrite = Command::Rewrite(rewrite);
-        self.commands.commit(Arc::new(rewrite)).await?;
+        let forgotten = forget_participant(self, who).await?;
         // After the games: one that retention deletes meanwhile is found here.
         self.control.forget_pruned(&who.of.name).await?;
         Ok(forgotten)

@@ -1,19 +1,20 @@
-//! Removing a participant from the database: reads what contains the name, and writes what changes,
-//! in one transaction of the writer. `store::forget` decides what changes.
+//! Removing a participant from the database: reads what contains the name, and sends what changes to
+//! the writer. `store::forget` decides what changes.
 
 use std::path::Path;
 
-use chefshat_record::pseudonym::Pseudonym;
+use async_trait::async_trait;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use sqlx::{Connection as _, Row as _};
 
 use super::SqliteStore;
 use super::errors::{explain, failure};
 use super::open::{self, IfGone, OpenError};
-use super::reader::Reader;
 use super::rows::with_own_rows;
-use crate::forget::{GameRows, Rewrite};
-use crate::{ForgetError, StoreError};
+use super::writer::WriteCommand;
+use crate::StoreError;
+use crate::decode_pool::DecodePool;
+use crate::forget::{GameRows, Rewritable, Rewrite};
 use chefshat_room::ids::Id;
 
 impl SqliteStore {
@@ -38,63 +39,40 @@ impl SqliteStore {
     }
 }
 
-impl Reader {
-    /// What removing a participant changes.
-    ///
-    /// # Errors
-    /// See [`ForgetError`].
-    pub(super) async fn forgetting(&self, who: &Pseudonym) -> Result<Rewrite, ForgetError> {
-        let mut rewrite = Rewrite::new(who);
-        let games: Vec<i64> = sqlx::query_scalar(
+#[async_trait]
+impl Rewritable for SqliteStore {
+    async fn games_with(&self, name: &str) -> Result<Vec<i64>, StoreError> {
+        sqlx::query_scalar(
             "SELECT number FROM games
              WHERE number IN (SELECT game FROM participants WHERE name = $1
                               UNION SELECT game FROM journal WHERE instr(entries, CAST($1 AS BLOB)) > 0
                               UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0)
              ORDER BY number",
         )
-        .bind(who.of.name.as_str())
-        .fetch_all(&self.pool)
+        .bind(name)
+        .fetch_all(&self.reader.pool)
         .await
-        .map_err(failure)?;
-        for number in games {
-            if let Some(rows) = self.game_rows(number).await? {
-                let bytes: usize = rows.journal.iter().map(|(_, bytes)| bytes.len()).sum();
-                let bytes = bytes + rows.record.as_ref().map_or(0, Vec::len);
-                let redacting = self
-                    .decoding
-                    .run(bytes / 64, move || rewrite.with_game(rows));
-                rewrite = redacting.await??;
-            }
-        }
-        let tournaments: Vec<i64> = sqlx::query_scalar(
+        .map_err(failure)
+    }
+
+    async fn tournaments_with(&self, name: &str) -> Result<Vec<i64>, StoreError> {
+        sqlx::query_scalar(
             "SELECT DISTINCT tournament FROM tournament_entries
              WHERE instr(entries, CAST($1 AS BLOB)) > 0",
         )
-        .bind(who.of.name.as_str())
-        .fetch_all(&self.pool)
+        .bind(name)
+        .fetch_all(&self.reader.pool)
         .await
-        .map_err(failure)?;
-        for number in tournaments {
-            let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
-                "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-            )
-            .bind(number)
-            .fetch_all(&self.pool)
-            .await
-            .map_err(failure)?;
-            rewrite = rewrite.with_tournament(number, rows)?;
-        }
-        Ok(rewrite)
+        .map_err(failure)
     }
 
-    /// The rows of a game; `None` if it was deleted.
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let row = sqlx::query(
             "SELECT game_id, state, filed, header, summary, record, last_row, signature
              FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
         )
         .bind(number)
-        .fetch_optional(&self.pool)
+        .fetch_optional(&self.reader.pool)
         .await
         .map_err(failure)?;
         let Some(row) = row else { return Ok(None) };
@@ -111,8 +89,27 @@ impl Reader {
             summary: row.get(4),
             record: row.get(5),
             signature: row.get(7),
-            journal: journal_of(&self.pool, number, row.get(6)).await?,
+            journal: journal_of(&self.reader.pool, number, row.get(6)).await?,
         }))
+    }
+
+    async fn tournament_rows(&self, number: i64) -> Result<Vec<(i64, Vec<u8>)>, StoreError> {
+        sqlx::query_as(
+            "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
+        )
+        .bind(number)
+        .fetch_all(&self.reader.pool)
+        .await
+        .map_err(failure)
+    }
+
+    async fn write(&self, rewrite: Rewrite) -> Result<(), StoreError> {
+        let rewrite = WriteCommand::Rewrite(Box::new(rewrite));
+        self.commands.send(rewrite).await
+    }
+
+    fn decoding(&self) -> &DecodePool {
+        &self.decoding
     }
 }
 

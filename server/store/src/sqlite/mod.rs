@@ -43,6 +43,7 @@ pub(crate) use open::{moved, moved_to};
 
 use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Reservations, Scratch};
+use super::forget::forget_participant;
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use super::{
@@ -338,12 +339,7 @@ impl Store for SqliteStore {
     }
 
     async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
-        let rewrite = self.reader.forgetting(who).await?;
-        let forgotten = rewrite.forgotten.clone();
-        self.commands
-            .send(WriteCommand::Rewrite(Box::new(rewrite)))
-            .await?;
-        Ok(forgotten)
+        forget_participant(self, who).await
     }
 
     async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {

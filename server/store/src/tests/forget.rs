@@ -5,8 +5,11 @@ use chefshat_engine::{ActionId, Seat};
 use chefshat_record::pseudonym::{Named, Redactions};
 use chefshat_room::journal::{Decided, Marked, ParticipantKind, SeatedParticipant, Source};
 use chefshat_tournament::{Change as TournamentChange, Entrant};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{AssertSqlSafe, Connection as _, Executor as _};
 
 use super::*;
+use crate::forget::MAX_REWRITTEN_AT_ONCE;
 use crate::tournaments::TournamentEntry;
 
 fn ana() -> Pseudonym {
@@ -190,6 +193,104 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
 async fn created_of_others(store: &dyn Store) -> Box<dyn Journal> {
     let created = store.create(header(2, Durability::Durable), vec![seated(0, "Bo")]);
     created.await.expect("a new game")
+}
+
+/// Plays more games of Ana to their ends than two transactions rewrite.
+async fn many_games(store: &dyn Store) -> Vec<GameId> {
+    let mut games = Vec::new();
+    for number in 1..=2 * MAX_REWRITTEN_AT_ONCE + 1 {
+        let (header, [begin, _]) = game(u8::try_from(number).expect("few"));
+        let created = store.create(Arc::clone(&header), begin).await;
+        let mut journal = created.expect("a new game");
+        let ended = journal.finish(Some(summary_of(&header)), None);
+        ended.await.expect("committed");
+        games.push(header.game_id);
+    }
+    games
+}
+
+/// The finished games of a participant.
+async fn games_of(store: &dyn Store, name: &str) -> Vec<GameId> {
+    let filter = v1::RecordFilter {
+        participant: name.into(),
+        ..v1::RecordFilter::default()
+    };
+    let found = store.list(&filter, Part::FROM_OLDEST, usize::MAX).await;
+    let summaries = (found.expect("readable").into_iter()).map(|it| it.summary.expect("readable"));
+    summaries
+        .map(|it| Id::parse(&it.game_id).expect("an id"))
+        .collect()
+}
+
+/// Removing Ana has failed at the last of these games.
+async fn repeated(store: &dyn Store, games: &[GameId]) {
+    let (changed, left) = games.split_at(2 * MAX_REWRITTEN_AT_ONCE);
+    assert_eq!(games_of(store, "Ana").await, left);
+    assert_eq!(games_of(store, "deleted 1").await, changed);
+    let forgotten = store.forget(&ana()).await.expect("all are over");
+    assert_eq!(forgotten.games, left);
+    assert_eq!(games_of(store, "deleted 1").await, games);
+}
+
+#[tokio::test]
+async fn a_removal_that_fails_is_completed_when_it_is_repeated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE));
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    let games = many_games(&store).await;
+    let last = hex::encode(games[games.len() - 1].bytes());
+    let mut other = SqliteConnection::connect_with(&file).await.expect("open");
+    let refusing = format!(
+        "CREATE TRIGGER refuse BEFORE UPDATE ON games WHEN old.game_id = x'{last}'
+         BEGIN SELECT raise(ABORT, 'refused'); END"
+    );
+    other.execute(AssertSqlSafe(refusing)).await.expect("done");
+    let refused = store.forget(&ana()).await;
+    assert!(matches!(refused, Err(ForgetError::Store(_))), "{refused:?}");
+    // After such a failure the store commits nothing more.
+    store.close().await;
+    drop(store);
+    other.execute("DROP TRIGGER refuse").await.expect("done");
+    other.close().await.expect("closed");
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    repeated(&store, &games).await;
+    store.close().await;
+
+    let database = chefshat_postgres::database();
+    let store = postgres::tests::node(&database).await;
+    let games = many_games(&store).await;
+    database.run(&format!(
+        "CREATE FUNCTION refuse() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN RAISE EXCEPTION 'refused'; END $$;
+         CREATE TRIGGER refuse BEFORE UPDATE ON games FOR EACH ROW
+         WHEN (old.game_id = '\\x{last}') EXECUTE FUNCTION refuse()"
+    ));
+    let refused = store.forget(&ana()).await;
+    assert!(matches!(refused, Err(ForgetError::Store(_))), "{refused:?}");
+    database.run("DROP TRIGGER refuse ON games");
+    repeated(&store, &games).await;
+    store.close().await;
+}
+
+/// Every statement is a round trip to the database, and a transaction must end in time.
+#[tokio::test]
+async fn how_much_postgresql_is_asked_at_once_does_not_grow_with_the_games() {
+    let database = chefshat_postgres::database();
+    let store = postgres::tests::node(&database).await;
+    let games = many_games(&store).await;
+    database.run(
+        "CREATE TABLE statements (transaction bigint);
+         CREATE FUNCTION note() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN INSERT INTO statements VALUES (txid_current()); RETURN NULL; END $$;
+         CREATE TRIGGER note AFTER UPDATE ON games EXECUTE FUNCTION note();
+         CREATE TRIGGER note AFTER UPDATE ON journal EXECUTE FUNCTION note();
+         CREATE TRIGGER note AFTER UPDATE ON participants EXECUTE FUNCTION note()",
+    );
+    let forgotten = store.forget(&ana()).await.expect("all are over");
+    assert_eq!(forgotten.games, games);
+    let counted = "SELECT count(DISTINCT transaction), count(*) FROM statements";
+    assert_eq!(database.run(counted), "3|9");
+    store.close().await;
 }
 
 #[tokio::test]
