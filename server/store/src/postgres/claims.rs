@@ -98,6 +98,12 @@ async fn take(connection: &mut PgConnection, node: i64, units: &[Vec<u8>]) -> sq
          ), form AS (
              UPDATE games SET form = $3 FROM owned
              WHERE unit = ANY ($1) AND NOT over AND games.game_id = owned.game_id AND games.form < $3
+         ), tournament AS (
+             UPDATE tournaments SET form = $3 FROM owned
+             WHERE unit = ANY ($1) AND NOT owned.over AND tournament_id = id AND tournaments.form < $3
+         ), study AS (
+             UPDATE studies SET form = $3 FROM owned
+             WHERE unit = ANY ($1) AND NOT over AND study_id = id AND studies.form < $3
          )
          UPDATE owned SET node = $2,
                           epoch = CASE WHEN over THEN epoch ELSE epoch + 1 END,

@@ -61,6 +61,8 @@ pub(super) struct DurableJournal {
     pub(super) running: Option<RunningGame>,
     /// Its last row so far.
     pub(super) last_row: Option<i64>,
+    /// Whether it was stored by a version of an older encoding, and nothing was added since.
+    pub(super) is_of_older_form: bool,
     pub(super) queue: WriteQueue,
     pub(super) readers: SqlitePool,
     pub(super) decoding: DecodePool,
@@ -94,6 +96,7 @@ impl DurableJournal {
             position: self.position,
             previous: self.last_row,
             entries: form::entries_to_bytes(entries),
+            raises_form: std::mem::take(&mut self.is_of_older_form),
         };
         self.position += 1;
         self.last_row = Some(number);

@@ -234,6 +234,7 @@ impl Store for SqliteStore {
             number,
             position: 0,
             last_row: None,
+            is_of_older_form: false,
             running: Some(queue.space.game()),
             queue,
             readers: self.reader.pool.clone(),

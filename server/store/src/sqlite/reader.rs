@@ -16,7 +16,7 @@ use super::retained::Units;
 use super::rows::{self, Read};
 use crate::Keep;
 use crate::decode_pool::DecodePool;
-use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
+use crate::form::{self, FORM, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::sql::{MAX_PRUNABLE_READ, OLD_GAMES, integer, list_query};
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
@@ -56,9 +56,9 @@ impl Reader {
         let mut running_journals = self.running_journals().await?;
         let mut left = Vec::with_capacity(games.len());
         for row in games {
-            let number: i64 = row.get(0);
+            let (number, form): (i64, i64) = (row.get(0), row.get(1));
             let concluded = row.get::<i64, _>(3) != 0;
-            let header = check_form(row.get(1)).and_then(|()| stored_header(row.get(2)));
+            let header = check_form(form).and_then(|()| stored_header(row.get(2)));
             let read = match concluded {
                 true => self.journal(number, row.get(4)).await?,
                 false => running_journals
@@ -71,6 +71,7 @@ impl Reader {
                         number,
                         position: read.rows,
                         last_row: read.last_row,
+                        is_of_older_form: form < FORM,
                         running: (!concluded).then(|| commands.space.game()),
                         queue: commands.clone(),
                         readers: self.pool.clone(),

@@ -22,6 +22,7 @@ use sqlx::{Connection as _, Executor as _};
 use super::{OpenError, SqliteStore};
 use crate::ephemeral::{BLOCK, EphemeralJournal, Scratch, StoreFinished};
 use crate::form;
+use crate::studies::StudyHeader;
 use crate::testing::{TypedUnits as _, cup};
 use crate::tournaments::TournamentEntry;
 use crate::{Journal, Keep, Part, Store, StoreError, StoredGame};
@@ -282,6 +283,70 @@ async fn an_unfinished_game_resumes_where_it_stopped() {
             .expect("readable")
             .is_empty()
     );
+}
+
+/// The versions of the encoding of what is in a table.
+async fn forms(store: &SqliteStore, table: &str) -> Vec<i64> {
+    let forms = format!("SELECT form FROM {table} ORDER BY number");
+    let forms = sqlx::query_scalar(sqlx::AssertSqlSafe(forms));
+    forms.fetch_all(&store.reader.pool).await.expect("readable")
+}
+
+#[tokio::test]
+async fn what_is_added_to_has_the_form_of_the_version_that_adds_to_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for number in [1, 2] {
+        let header = Arc::new(header(number, Durability::Durable));
+        store.create(header, entries()).await.expect("committed");
+        let cup = Arc::new(cup(number));
+        let created = store.create_tournament(cup, Vec::new());
+        created.await.expect("committed");
+        let study = StudyHeader {
+            id: Id::from_bytes([number; 16]),
+            settings: v1::StudySettings::default(),
+            created_at_ms: 1_000,
+            owner: SecretHash::of(b"owner"),
+            key: [7; 32],
+        };
+        let created = store.create_study(Arc::new(study));
+        created.await.expect("committed");
+    }
+    store.close().await;
+    drop(store);
+    // An earlier version has stored all of it.
+    let tables = ["games", "tournaments", "studies"];
+    let file = SqliteConnectOptions::new().filename(folder.path().join(super::DATABASE_FILE));
+    let mut other = SqliteConnection::connect_with(&file).await.expect("open");
+    for table in tables {
+        let earlier = sqlx::AssertSqlSafe(format!("UPDATE {table} SET form = 1"));
+        other.execute(earlier).await.expect("done");
+    }
+    other.close().await.expect("closed");
+
+    let store = opened(folder.path()).await;
+    let mut games = store.resumable_games(u64::MAX).await.expect("readable");
+    for table in tables {
+        assert_eq!(
+            forms(&store, table).await,
+            [1, 1],
+            "nothing is added to {table} yet"
+        );
+    }
+    let first = games.first_mut().expect("two games");
+    first
+        .journal
+        .append(&mut entries())
+        .await
+        .expect("committed");
+    let appended = store.append_tournament(Id::from_bytes([1; 16]), 1, Vec::new());
+    appended.await.expect("committed");
+    let appended = store.append_study(Id::from_bytes([1; 16]), 0, Vec::new());
+    appended.await.expect("committed");
+    for table in tables {
+        assert_eq!(forms(&store, table).await, [form::FORM, 1], "{table}");
+    }
+    store.close().await;
 }
 
 #[tokio::test]

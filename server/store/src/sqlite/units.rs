@@ -10,6 +10,8 @@ const CREATE: &str = "INSERT INTO {units} ({unit_id}, form, header) VALUES ($1, 
      ON CONFLICT ({unit_id}) DO NOTHING";
 const APPEND: &str = "INSERT INTO {rows} ({unit}, position, {entries})
      SELECT number, $2, $3 FROM {units} WHERE {unit_id} = $1";
+/// What is added, versions of an older encoding may not know: they leave the unit alone.
+const RAISE_FORM: &str = "UPDATE {units} SET form = $2 WHERE {unit_id} = $1 AND form < $2";
 const END: &str = "UPDATE tournaments SET over = 1 WHERE tournament_id = $1";
 const DELETE_ROWS: &str =
     "DELETE FROM {rows} WHERE {unit} = (SELECT number FROM {units} WHERE {unit_id} = $1)";
@@ -70,6 +72,7 @@ pub(super) async fn write(
             .bind(form::traces_to_bytes(traces))
             .execute(&mut *connection)
             .await?;
+            raise_form(connection, unit).await?;
         }
         UnitWrite::Delete => {
             for text in [DELETE_TRACES, DELETE_ROWS, DELETE] {
@@ -95,10 +98,20 @@ async fn append(
         // Nothing deletes a tournament: what is to be committed would be lost.
         return Err(sqlx::Error::RowNotFound);
     }
+    raise_form(connection, unit).await?;
     match row.over {
         true => run(connection, unit, END).await,
         false => Ok(()),
     }
+}
+
+async fn raise_form(connection: &mut SqliteConnection, unit: UnitKey) -> sqlx::Result<()> {
+    sqlx::query(unit.kind().sql(RAISE_FORM))
+        .bind(unit.id().bytes().as_slice())
+        .bind(FORM)
+        .execute(connection)
+        .await
+        .map(drop)
 }
 
 /// Runs a statement about one unit.

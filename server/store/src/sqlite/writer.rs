@@ -122,6 +122,8 @@ pub(super) struct Row {
     /// The number of the game's previous row.
     pub(super) previous: Option<i64>,
     pub(super) entries: Vec<u8>,
+    /// Whether the game has an older encoding, to which the entries may be unknown.
+    pub(super) raises_form: bool,
 }
 
 /// A command and the sender of its result.
@@ -293,7 +295,8 @@ async fn write(
 ) -> sqlx::Result<Taken> {
     let mut taken = BTreeMap::new();
     let mut rows = Vec::with_capacity(pending.len());
-    let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, WriteCommand::Append(_)));
+    let rows_alone = (pending.iter())
+        .all(|(order, _)| matches!(order, WriteCommand::Append(row) if !row.raises_form));
     if !rows_alone {
         connection.execute("BEGIN IMMEDIATE").await?;
     }
@@ -301,7 +304,12 @@ async fn write(
     // order.
     for (index, (order, _)) in pending.iter_mut().enumerate() {
         match order {
-            WriteCommand::Append(row) => rows.push(row),
+            WriteCommand::Append(row) => {
+                if row.raises_form {
+                    raise_form(connection, row.game).await?;
+                }
+                rows.push(row);
+            }
             WriteCommand::Close => {}
             WriteCommand::Create {
                 number,
@@ -492,6 +500,16 @@ fn insert(mut rows: usize) -> String {
         rows = rows.saturating_sub(places);
     }
     text
+}
+
+/// Says that a game has the encoding of this version, so that earlier ones leave it alone.
+async fn raise_form(connection: &mut SqliteConnection, number: i64) -> sqlx::Result<()> {
+    sqlx::query("UPDATE games SET form = $2 WHERE number = $1")
+        .bind(number)
+        .bind(FORM)
+        .execute(connection)
+        .await
+        .map(drop)
 }
 
 /// Inserts a game; `false` if its id is taken.

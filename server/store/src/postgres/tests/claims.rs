@@ -4,6 +4,8 @@ use chefshat_cluster::Load;
 
 use super::fencing::Pair;
 use super::*;
+use crate::form::FORM;
+use crate::studies::StudyHeader;
 use chefshat_room::ids::{Id, UnitId};
 
 const FIRST: Epoch = Epoch::FIRST;
@@ -183,5 +185,38 @@ async fn a_room_of_a_newer_form_is_left_to_newer_nodes() {
     assert_eq!(pair.second.orphans(9).await, Ok(at(FIRST, [2])));
     let claimed = pair.second.claim_all(at(FIRST, 1..=2)).await;
     assert_eq!(claimed, Ok(vec![None, Some(SECOND)]));
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn what_is_claimed_has_the_form_of_its_new_owner() {
+    let pair = Pair::new().await;
+    create(&pair.first, [1]).await;
+    let first = &pair.first;
+    for number in [2, 3] {
+        let created = first.create_tournament(cup(number), begun());
+        created.await.expect("created");
+        let study = StudyHeader {
+            id: Id::from_bytes([number + 2; 16]),
+            settings: v1::StudySettings::default(),
+            created_at_ms: 1_000,
+            owner: SecretHash::of(b"owner"),
+            key: [7; 32],
+        };
+        let created = first.create_study(Arc::new(study));
+        created.await.expect("created");
+    }
+    // An earlier version has stored all of it.
+    for table in ["owned", "games", "tournaments", "studies"] {
+        pair.database.run(&format!("UPDATE {table} SET form = 1"));
+    }
+    pair.stall().await;
+    let claimed = pair.second.claim_all(at(FIRST, [1, 2, 4])).await;
+    assert_eq!(claimed, Ok(vec![Some(SECOND); 3]));
+    let stored = "SELECT form FROM games UNION ALL
+                  (SELECT form FROM tournaments ORDER BY number) UNION ALL
+                  (SELECT form FROM studies ORDER BY number)";
+    let forms = [FORM, FORM, 1, FORM, 1].map(|form| form.to_string());
+    assert_eq!(pair.database.run(stored), forms.join("\n"));
     pair.close().await;
 }

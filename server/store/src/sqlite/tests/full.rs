@@ -116,6 +116,7 @@ async fn deletions_go_first_however_many_rooms_wait() {
             position: 0,
             previous: None,
             entries: vec![1],
+            raises_form: false,
         };
         rooms.push(send(&commands, WriteCommand::Append(row)).await);
     }
