@@ -10,16 +10,18 @@ use prost::Message as _;
 use prost::encoding::{WireType, encode_key};
 use prost_types::FileDescriptorSet;
 
-use super::{FORM, entry, tournament};
+use super::{FORM, entry, study, tournament};
 
 /// The messages of the protocol that are stored as they are.
-const STORED: [&str; 8] = [
+const STORED: [&str; 10] = [
     "Annotations",
     "Expression",
     "GameStart",
     "RoomPolicy",
     "RuleSet",
     "SeatConfig",
+    "StudySettings",
+    "StudyTrace",
     "TableReport",
     "TournamentSettings",
 ];
@@ -89,12 +91,15 @@ fn stored_messages() -> BTreeMap<String, String> {
 #[test]
 fn what_is_stored_is_what_its_version_says() {
     let mut text = format!("entries of games: {}\n", kinds(entry::is_known));
-    writeln!(
-        text,
-        "entries of tournaments: {}",
-        kinds(tournament::is_known)
-    )
-    .expect("memory");
+    for (what, is_known) in [
+        (
+            "entries of tournaments",
+            tournament::is_known as fn(&[u8]) -> bool,
+        ),
+        ("changes of studies", study::is_known),
+    ] {
+        writeln!(text, "{what}: {}", kinds(is_known)).expect("memory");
+    }
     for (name, numbers) in stored_messages() {
         writeln!(text, "{name}: {numbers}").expect("memory");
     }

@@ -34,7 +34,7 @@ pub(super) use tournament::{tournament_entries_from_bytes, tournament_from_bytes
 /// 2: absence times; participants who leave during a game; tournaments that are changed by hand.
 /// 3: the confirmed end of a game at a physical table; connections that are lost with a node;
 /// participants who join a study by its open link; devices and sessions of a study; steps that its
-/// participants pass over; its test participants, and those who are screened out.
+/// participants pass over; its test participants, its groups, and those who are screened out.
 pub(super) const FORM: i64 = 3;
 /// The oldest version that this one reads.
 const OLDEST_FORM: i64 = 1;

@@ -38,6 +38,12 @@ struct ChangeForm {
     kind: Option<KindForm>,
 }
 
+/// Whether these bytes are a change of a kind that this version knows.
+#[cfg(test)]
+pub(super) fn is_known(bytes: &[u8]) -> bool {
+    ChangeForm::decode(bytes).is_ok_and(|change| change.kind.is_some())
+}
+
 #[derive(Clone, PartialEq, prost::Oneof)]
 enum KindForm {
     #[prost(message, tag = "1")]

@@ -5,7 +5,7 @@ use chefshat_study::{
 };
 
 use super::*;
-use crate::studies::StudyHeader;
+use crate::studies::{StudyHeader, changes_to_bytes};
 
 fn header(study: u8) -> Arc<StudyHeader> {
     Arc::new(StudyHeader {
@@ -154,6 +154,18 @@ fn every_change() -> Vec<Change> {
         Change::Removed { number, at_ms },
         Change::Closed,
     ]
+}
+
+/// The encoding never changes: studies stored by any version must be readable by every later one.
+#[test]
+fn the_encoding_of_studies_stays_readable() {
+    let written = format!(
+        "{}\n{}\n{}\n",
+        hex::encode(header(1).to_bytes()),
+        hex::encode(changes_to_bytes(&every_change())),
+        hex::encode(form::traces_to_bytes(&traces(1)))
+    );
+    assert_eq!(written, include_str!("../sqlite/fixtures/study3.hex"));
 }
 
 fn traces(number: u32) -> StoredTraces {
