@@ -223,7 +223,7 @@ pub(crate) static ATTACKS: &[Attack] = &[
     ),
     attack!(
         "list-rooms-stalled",
-        "ListRooms with 100 rooms on 20 connections x 1,000 streams with a window of 0",
+        "ListRooms with 100 rooms on 20 connections x 1,000 streams with windows of 0 and 1",
         ListRooms,
         |target| {
             let request = v1::ListRoomsRequest { page_size: 100, ..Default::default() };

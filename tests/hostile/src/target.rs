@@ -170,7 +170,8 @@ impl Target {
         sleep_until(self.until).await;
     }
 
-    /// Opens many streams on many connections, whose windows stay closed, and holds them.
+    /// Opens many streams on many connections and holds them. Their windows stay closed on one half of
+    /// the connections, and have one byte on the other: there a server begins to send each answer.
     pub(crate) async fn hold_streams(
         &self,
         connections: u32,
@@ -179,10 +180,10 @@ impl Target {
         body: Option<Bytes>,
     ) {
         let mut opening = JoinSet::new();
-        for _ in 0..self.count(connections) {
+        for number in 0..self.count(connections) {
             let (target, body) = (self.clone(), body.clone());
             opening.spawn(async move {
-                let window = 0;
+                let window = number % 2;
                 let connected = raw::http2(target.address, ATTACKER, window);
                 let Ok(Ok(sender)) = timeout_at(target.until, connected).await else {
                     return target.tally.lost();
