@@ -150,6 +150,15 @@ async fn assert_refuses_rooms(client: &Client) {
     assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
 }
 
+/// Lists rooms, of which some wait for the disk.
+async fn assert_lists_rooms(client: &Client) {
+    let listed = patiently("rooms", client.list_rooms(v1::ListRoomsRequest::default())).await;
+    let rooms = listed.expect("a list").rooms;
+    // That of `assert_plays_in_memory`.
+    let has_one = (rooms.iter()).any(|room| room.state() == v1::RoomState::Playing);
+    assert!(has_one, "{rooms:?}");
+}
+
 /// Takes a decision in a room that needs no disk.
 async fn assert_plays_in_memory(client: &Client) {
     let policy = v1::RoomPolicy {
@@ -192,6 +201,7 @@ async fn a_full_disk_holds_games_up_and_loses_nothing() {
     let client = connected(&launch).await;
     assert_refuses_rooms(&client).await;
     assert_plays_in_memory(&client).await;
+    assert_lists_rooms(&client).await;
     // It recovers by itself.
     std::fs::remove_file(disk.path().join("filler")).expect("removed");
     let ledger = Arc::clone(&busy_rooms.ledger);
