@@ -29,11 +29,11 @@ pub(super) struct StudyData {
     answers: Mutex<BTreeMap<u32, Answers>>,
 }
 
-/// The memory of the answers and devices of a participant.
+/// The memory of the answers, devices and traces of a participant.
 #[derive(Debug, Default)]
 struct Answers {
     given: Vec<Permit>,
-    devices: Vec<Permit>,
+    others: Vec<Permit>,
     /// Of those that were saved while they are entered.
     saved: Option<Permit>,
 }
@@ -57,7 +57,7 @@ impl StudyData {
             let devices = devices.map(|it| take(memory_of_device(&it.device)));
             let answers = Answers {
                 given,
-                devices: devices.collect(),
+                others: devices.collect(),
                 saved,
             };
             (*number, answers)
@@ -96,10 +96,19 @@ impl StudyData {
         self.take(key, memory_of_device(device))
     }
 
-    /// Keeps the memory of a device of a participant.
-    pub(super) fn keep_device(&self, number: u32, held: Permit) {
+    /// Takes memory for traces, where the store keeps them in memory; `None` if the caller, or the server,
+    /// has too much.
+    pub(super) fn for_traces(&self, key: Key, traces: &[v1::StudyTrace]) -> Option<Permit> {
+        let bytes = traces
+            .iter()
+            .map(|it| size_of::<v1::StudyTrace>() + it.target.len());
+        self.take(key, bytes.sum())
+    }
+
+    /// Keeps the memory of a device or of traces of a participant.
+    pub(super) fn keep(&self, number: u32, held: Permit) {
         let mut answers = self.lock_answers();
-        answers.entry(number).or_default().devices.push(held);
+        answers.entry(number).or_default().others.push(held);
     }
 
     /// Keeps the memory of participants that were added.

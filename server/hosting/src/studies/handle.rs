@@ -300,7 +300,7 @@ impl StudyHandle {
                 return Ok((Vec::new(), 0));
             };
             match (memory, &mut change) {
-                (Some(memory), _) => data.keep_device(number, memory),
+                (Some(memory), _) => data.keep(number, memory),
                 (None, Change::Opened { device, .. }) => *device = None,
                 (None, _) => {}
             }
@@ -487,6 +487,7 @@ impl StudyHandle {
     pub async fn record_traces(
         &self,
         (number, session): (u32, u32),
+        key: Key,
         game: GameId,
         traces: Vec<v1::StudyTrace>,
         rooms: &Rooms,
@@ -513,6 +514,11 @@ impl StudyHandle {
         let count = counts.entry((number, game)).or_default();
         if *count + traces.len() > MAX_TRACES_OF_GAME {
             return Err(TraceRefusal::TooMany);
+        }
+        if !rooms.store().outlives_server() {
+            let data = &self.shared.data;
+            let memory = data.for_traces(key, &traces).ok_or(TraceRefusal::TooMany)?;
+            data.keep(number, memory);
         }
         *count += traces.len();
         let traces = StoredTraces {

@@ -14,6 +14,7 @@ use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
 use crate::journaled::ROOMS_AT_ONCE;
 use crate::studies::task::DELETION_RETRY;
+use chefshat_admission::limits::Key;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_record::samples;
 use chefshat_room::ids::{GameId, RoomId};
@@ -926,7 +927,10 @@ async fn traces_that_were_sent_again_are_exported_once() {
     ] {
         let traces = times.iter().copied().map(trace).collect();
         let rooms = lab.studies.rooms();
-        let recorded = lab.study.record_traces((1, 1), game, traces, rooms).await;
+        let recorded = lab
+            .study
+            .record_traces((1, 1), Key::Local, game, traces, rooms)
+            .await;
         assert_eq!(recorded, Ok(()));
     }
     let tables = tables(&exported(&lab, false).await);

@@ -339,7 +339,7 @@ impl ParticipationService for StudyCalls {
             .map(|trace| trace.encoded_len())
             .sum();
         rooms.may_store(key, bytes).map_err(Refusal::from)?;
-        let recorded = handle.record_traces((number, session), game, request.traces, rooms);
+        let recorded = handle.record_traces((number, session), key, game, request.traces, rooms);
         recorded.await.map_err(traces_refused)?;
         Ok(Response::new(v1::RecordTracesResponse {}))
     }
