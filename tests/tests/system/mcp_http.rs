@@ -286,3 +286,32 @@ async fn the_seat_of_a_client_that_has_gone_is_given_back() {
     })
     .await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_makes_one_request_at_a_time() {
+    let server = TestServer::start().await;
+    let listening = Listening::start(&server, &[]).await;
+    let address = listening
+        .url
+        .trim_start_matches("http://")
+        .split('/')
+        .next();
+    let connected = TcpStream::connect(address.expect("an address")).await;
+    let mut connection = connected.expect("it listens");
+    // A client that begins with HTTP/2 would have many at a time.
+    let begun = connection
+        .write_all(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n")
+        .await;
+    begun.expect("it is read");
+    let mut answer = Vec::new();
+    let read = patiently("the end", connection.read_to_end(&mut answer)).await;
+    // What it does not read resets the connection.
+    let _ = read;
+    assert!(
+        answer.is_empty()
+            || answer.starts_with(b"HTTP/1.1 4")
+            || answer.starts_with(b"HTTP/1.1 505"),
+        "{}",
+        String::from_utf8_lossy(&answer)
+    );
+}

@@ -2,21 +2,24 @@
 //! which the current revision of the protocol does not have and older ones do not require: seats
 //! are found by their handles, and a client that has said `initialize` costs nothing more.
 
-use std::io;
 use std::net::SocketAddr;
-use std::pin::Pin;
+use std::pin::pin;
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::Router;
-use axum::serve::Listener;
 use chefshat_server::connections::{self, Connection, Connections, Limits};
 use chefshat_server::limits::Shares;
 use chefshat_server::proxies::TrustedProxies;
-use futures::{Stream, StreamExt as _};
+use futures::StreamExt as _;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
 use rmcp::transport::streamable_http_server::session::never::NeverSessionManager;
 use rmcp::transport::streamable_http_server::{StreamableHttpServerConfig, StreamableHttpService};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 
 use super::server::{Server, Settings};
 use chefshat_cli::error::{CommandError, say};
@@ -28,6 +31,8 @@ const MAX_REQUEST_BYTES: usize = 64 * 1024;
 /// Maximum number of connections, each of which makes one request at a time. One address has a share
 /// of them, as on a game server.
 const MAX_CONNECTIONS: usize = 256;
+/// How long a connection may be without a request: then its place is free.
+const IDLE_LIMIT: Duration = Duration::from_secs(60);
 
 /// Which requests are answered, besides those for this computer by programs.
 pub(super) struct Checks {
@@ -72,56 +77,50 @@ pub(super) async fn serve(
     );
     let router = Router::new().route_service(PATH, service);
     say(format_args!("listening on http://{address}{PATH}"))?;
-    let stopped = async move {
+    let stopped = stop.clone();
+    let stopping = async move {
         if let Err(error) = asked_to_stop.await {
             tracing::error!("signals cannot be received: {error}");
         }
         stop.cancel();
     };
-    axum::serve(Limited::new(listener, address), router)
-        .with_graceful_shutdown(stopped)
-        .await?;
+    tokio::join!(stopping, accept(listener, &router, &stopped));
     Ok(())
 }
 
-/// A listener with a limited number of connections.
-struct Limited<S> {
-    accepted: Pin<Box<S>>,
-    address: SocketAddr,
-}
-
-impl Limited<()> {
-    fn new(
-        listener: TcpListener,
-        address: SocketAddr,
-    ) -> Limited<impl Stream<Item = io::Result<Connection>>> {
-        let limits = Limits {
-            max_connections: MAX_CONNECTIONS,
-            shares: Shares::default(),
-            trusted_proxies: TrustedProxies::default(),
-        };
-        let connections = Connections::new(limits, Arc::default());
-        let accepted = Box::pin(connections::accept(listener.into(), connections));
-        Limited { accepted, address }
-    }
-}
-
-impl<S: Stream<Item = io::Result<Connection>> + Send + 'static> Listener for Limited<S> {
-    type Io = Connection;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Connection, SocketAddr) {
-        loop {
-            match self.accepted.next().await {
-                Some(Ok(connection)) => return (connection, self.address),
-                // It tries again by itself, and has no end.
-                Some(Err(_)) => {}
-                None => std::future::pending().await,
-            }
+/// Serves connections until `stop`, and those that there are until their requests are answered.
+async fn accept(listener: TcpListener, router: &Router, stop: &CancellationToken) {
+    let limits = Limits {
+        max_connections: MAX_CONNECTIONS,
+        shares: Shares::default(),
+        trusted_proxies: TrustedProxies::default(),
+    };
+    let connections = Connections::new(limits, Arc::default());
+    let accepted = connections::accept(listener.into(), connections).take_until(stop.cancelled());
+    let mut accepted = pin!(accepted);
+    let serving = TaskTracker::new();
+    while let Some(connection) = accepted.next().await {
+        // After a failure it tries again.
+        if let Ok(connection) = connection {
+            serving.spawn(serve_one(connection, router.clone(), stop.clone()));
         }
     }
+    serving.close();
+    serving.wait().await;
+}
 
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        Ok(self.address)
+/// Serves one connection, by HTTP/1 alone: it makes one request at a time.
+async fn serve_one(connection: Connection, router: Router, stop: CancellationToken) {
+    let serving = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(IDLE_LIMIT)
+        .serve_connection(TokioIo::new(connection), TowerToHyperService::new(router));
+    let mut serving = pin!(serving);
+    tokio::select! {
+        // A client that fails is disconnected.
+        _ = serving.as_mut() => return,
+        () = stop.cancelled() => {}
     }
+    serving.as_mut().graceful_shutdown();
+    let _ = serving.await;
 }
