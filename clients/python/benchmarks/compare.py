@@ -1,7 +1,8 @@
 """Decisions per second of every way to play with this package, beside other environments of card games, in one run on one machine.
 
 Ours: n games with all seats, and one seat against `greedy` and `trained`, in this process and over the network; one game through
-Gymnasium, with its wrappers. Others, each if it is installed: OpenSpiel's hearts, pgx's Leduc hold'em, PettingZoo's Leduc hold'em.
+Gymnasium and PettingZoo, with their wrappers. Others, each if it is installed: OpenSpiel's hearts, pgx's Leduc hold'em,
+PettingZoo's Leduc hold'em.
 Every policy is random over the legal actions. Nothing runs at the same time.
 """
 
@@ -52,6 +53,8 @@ def everything(options: argparse.Namespace) -> Iterator[tuple[str, Play]]:
                 yield f"{way}, {against}, n = {games:,}", late(functools.partial(ours, address, games, opponents, options.seed))
     if installed("gymnasium"):
         yield "Gymnasium, one game", late(functools.partial(through_gymnasium, options.seed))
+    if installed("pettingzoo"):
+        yield "PettingZoo, one game", late(functools.partial(through_pettingzoo, options.seed))
     if installed("pyspiel"):
         yield "OpenSpiel hearts", late(functools.partial(hearts, options.seed))
     if installed("pgx"):
@@ -155,11 +158,22 @@ def pgx_leduc(games: int, seed: int) -> Play:
     return play
 
 
+def through_pettingzoo(seed: int) -> Play:
+    """One game of this package through PettingZoo; decisions of all agents count."""
+    from chefshat.envs import chefshat_v1
+
+    return turns(chefshat_v1.env(), seed)
+
+
 def pettingzoo_leduc(seed: int) -> Play:
     """One game of PettingZoo at a time."""
     from pettingzoo.classic import leduc_holdem_v4
 
-    env = leduc_holdem_v4.env()
+    return turns(leduc_holdem_v4.env(), seed)
+
+
+def turns(env: Any, seed: int) -> Play:
+    """Episodes of an environment of PettingZoo."""
     chance = random.Random(seed)
     env.reset(seed=seed)
 
