@@ -250,9 +250,11 @@ async fn number_of(client: &Client, id: &str, who: &str) -> Result<u32, CommandE
     let tournament = client.tournament(id).await?;
     let participants = &tournament.participants;
     let wanted = who.to_lowercase();
-    let by_name = participants
+    let named = participants
         .iter()
-        .find(|it| it.name.to_lowercase() == wanted);
+        .filter(|it| it.name.to_lowercase() == wanted);
+    // A withdrawn participant may have joined again under the same name.
+    let by_name = named.max_by_key(|it| (!it.withdrawn, it.participant));
     let number = by_name.map(|it| it.participant).or(who.parse().ok());
     number.ok_or_else(|| format!("no participant of this tournament is named {who}").into())
 }

@@ -302,6 +302,33 @@ fn an_organiser_changes_a_tournament_by_hand() {
 }
 
 #[test]
+fn a_name_means_the_participant_that_has_not_withdrawn() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let owner = path(folder.path(), "owner");
+    let settings = "--name friday --format round_robin --rounds 1 --built-in greedy*2";
+    let create = format!("tournament create {settings} --no-show-time-ms 3600000");
+    let made = run(&url, &format!("{create} --owner-file {owner} --json")).json();
+    let id = made["tournament"]["tournamentId"].as_str().unwrap();
+    let code = made["join_code"].as_str().unwrap();
+    let command = |words: &str| {
+        let ended = run(&url, &format!("tournament {words} --owner-file {owner}"));
+        ended.well().stdout
+    };
+    let rest = "participants  greedy 1, greedy 2\n";
+    ticket_of(&url, code, "Ada");
+    assert_eq!(command(&format!("withdraw {id} --participant Ada")), rest);
+    ticket_of(&url, code, "Ada");
+    assert_eq!(command(&format!("remove {id} Ada")), rest);
+    for name in ["Ada", "Bo"] {
+        ticket_of(&url, code, name);
+    }
+    command(&format!("start {id}"));
+    let replaced = command(&format!("replace {id} Ada --built-in random --name Cy"));
+    assert_eq!(replaced, "participants  greedy 1, greedy 2, Cy, Bo\n");
+}
+
+#[test]
 fn invalid_tournament_options_are_reported_by_flag() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
