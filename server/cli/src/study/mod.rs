@@ -115,18 +115,30 @@ impl Create {
         let created = created.into_inner();
         let study = created.study.ok_or("the server did not return the study")?;
         let owner = created.owner_token;
-        if let Some(file) = owner_file {
-            file.write(&owner)?;
-        }
+        let written = owner_file.map(|file| file.write(&owner));
         if self.json {
-            return say(json!({"event": "created", "study": study, "owner_token": owner}));
+            say(json!({"event": "created", "study": study, "owner_token": owner}))?;
+        } else {
+            // The token is nowhere else if its file could not be written.
+            let kept = (self.owner_file.as_ref()).filter(|_| matches!(written, Some(Ok(()))));
+            self.print(&study, &owner, kept)?;
         }
+        written.unwrap_or(Ok(()))
+    }
+
+    /// Prints a study that was created, and its owner token unless a file has it.
+    fn print(
+        &self,
+        study: &v1::Study,
+        owner: &str,
+        owner_file: Option<&PathBuf>,
+    ) -> Result<(), CommandError> {
         say(format_args!("study        {}", study.study_id))?;
-        match &self.owner_file {
+        match owner_file {
             Some(file) => say(format_args!("owner token  in {}", file.display()))?,
             None => say(format_args!("owner token  {owner}"))?,
         }
-        if let Some(address) = owner::open_address(self.server.url(), &study) {
+        if let Some(address) = owner::open_address(self.server.url(), study) {
             say(format_args!("open link    {address}"))?;
         }
         say(format_args!(
@@ -140,7 +152,7 @@ impl Create {
             study.games,
             study.practice_games
         ))?;
-        match study.settings.and_then(|it| it.groups) {
+        match study.settings.as_ref().and_then(|it| it.groups.as_ref()) {
             None => Ok(()),
             Some(groups) => say(format_args!("they play in groups of {}", groups.size)),
         }

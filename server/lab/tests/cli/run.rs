@@ -148,7 +148,10 @@ pub(super) fn fixture(path: &str) -> PathBuf {
 
 /// The program, without `CHEFSHAT_*` variables.
 pub(super) fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat-lab"));
+    without_settings(Command::new(env!("CARGO_BIN_EXE_chefshat-lab")))
+}
+
+fn without_settings(mut command: Command) -> Command {
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("CHEFSHAT_") {
             command.env_remove(name);
@@ -172,6 +175,15 @@ pub(super) fn typed(line: &str) -> Ended {
 /// Runs a command line against a server.
 pub(super) fn run(server: &str, line: &str) -> Ended {
     typed(&format!("{line} --server {server}"))
+}
+
+/// Runs a command line as on a full disk: it can write to no file.
+pub(super) fn typed_on_a_full_disk(line: &str) -> Ended {
+    let mut shell = without_settings(Command::new("sh"));
+    // Without its signal, a write beyond the limit fails.
+    let script = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
+    shell.args(["-c", script, "sh", env!("CARGO_BIN_EXE_chefshat-lab")]);
+    Ended::of(shell.args(line.split_whitespace()).output().unwrap())
 }
 
 /// A process that is killed at the end of the test.

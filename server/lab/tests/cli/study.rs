@@ -11,7 +11,9 @@ use chefshat_proto::v1::participation_service_client::ParticipationServiceClient
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, Running, chefshat, in_runtime, run, serve, serve_at};
+use super::run::{
+    Ended, Running, chefshat, in_runtime, run, serve, serve_at, typed_on_a_full_disk,
+};
 
 /// The example of the documentation.
 const EXAMPLE: &str = concat!(
@@ -66,6 +68,25 @@ fn a_study_is_followed_across_the_death_of_its_server() {
     let rest: Vec<Value> = lines.collect();
     assert!(!rest.is_empty() && !rest.contains(&first), "{rest:?}");
     assert_eq!(following.0.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn an_owner_token_whose_file_cannot_be_written_is_printed() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let owner = folder.path().join("owner");
+    let create = format!("study create {EXAMPLE} --server {url}");
+    let create = format!("{create} --owner-file {}", owner.display());
+    let created = typed_on_a_full_disk(&create);
+    assert_eq!(created.code, Some(1), "{created:?}");
+    assert!(created.stderr.contains("an owner token cannot be written"));
+    assert!(!owner.exists());
+    let value = |name: &str| {
+        let line = created.stdout.lines().find(|line| line.starts_with(name));
+        line.unwrap().split_whitespace().last().unwrap().to_owned()
+    };
+    let (id, token) = (value("study "), value("owner token "));
+    run(&url, &format!("study show {id} --owner-token {token}")).well();
 }
 
 /// The example of the documentation with pairs.
