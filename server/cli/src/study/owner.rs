@@ -6,8 +6,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use chefshat_client::Error;
+use chefshat_client::{Connection, Error};
 use chefshat_proto::v1;
+use chefshat_proto::v1::study_service_client::StudyServiceClient;
 use chrono::{DateTime, SecondsFormat};
 use clap::Args;
 use serde_json::json;
@@ -236,30 +237,43 @@ impl Links {
 
 impl Follow {
     pub(super) async fn run(self) -> Result<(), CommandError> {
-        let mut shown = Shown::default();
-        let mut reached = Instant::now();
-        while let Some(error) = self.follow(&mut shown, &mut reached).await? {
-            // The server stops, has died, or hands the study to another node, where it goes on.
-            if !error.may_retry() || reached.elapsed() >= PATIENCE {
-                return Err(error.into());
-            }
-            tokio::time::sleep(FOLLOW_AGAIN).await;
-        }
-        Ok(())
-    }
-
-    /// Shows changes until the study is over, or the server ends the stream before, and returns why it
-    /// did. `reached` is when the server sent the last one.
-    async fn follow(
-        &self,
-        shown: &mut Shown,
-        reached: &mut Instant,
-    ) -> Result<Option<Error>, CommandError> {
-        let mut service = service(&self.owned.server).await?;
+        // It connects again by itself.
+        let service = service(&self.owned.server).await?;
         let request = v1::FollowStudyRequest {
             study_id: self.owned.study_id.clone(),
             owner_token: self.owned.owner.token()?,
         };
+        let mut shown = Shown::default();
+        let mut outage = None;
+        loop {
+            let followed = self.follow(service.clone(), request.clone(), &mut shown, &mut outage);
+            let Some(error) = followed.await? else {
+                return Ok(());
+            };
+            // The server stops, has died, or hands the study to another node, which resumes it.
+            let Outage { since, failures } = outage.get_or_insert_with(Outage::begins);
+            if !error.may_retry() || since.elapsed() >= PATIENCE {
+                return Err(error.into());
+            }
+            *failures += 1;
+            // The first one is the end of the stream, which a server that is back at once hides.
+            if *failures == 2 {
+                let patience = PATIENCE.as_secs();
+                anstream::eprintln!("{error}; retrying for up to {patience} seconds");
+            }
+            tokio::time::sleep(FOLLOW_AGAIN).await;
+        }
+    }
+
+    /// Shows changes until the study is over, or the stream ends before, and returns why it did. Each
+    /// change ends the outage.
+    async fn follow(
+        &self,
+        mut service: StudyServiceClient<Connection>,
+        request: v1::FollowStudyRequest,
+        shown: &mut Shown,
+        outage: &mut Option<Outage>,
+    ) -> Result<Option<Error>, CommandError> {
         let mut updates = match service.follow_study(request).await {
             Ok(followed) => followed.into_inner(),
             Err(status) => return Ok(Some(status.into())),
@@ -270,7 +284,7 @@ impl Follow {
                 Ok(None) => return Ok(None),
                 Err(status) => return Ok(Some(status.into())),
             };
-            *reached = Instant::now();
+            *outage = None;
             if self.owned.json {
                 if update != v1::FollowStudyResponse::default() {
                     say(json!(update))?;
@@ -284,6 +298,21 @@ impl Follow {
                 .participants
                 .iter()
                 .try_for_each(|it| say(line(it)))?;
+        }
+    }
+}
+
+/// A time without a server.
+struct Outage {
+    since: Instant,
+    failures: u32,
+}
+
+impl Outage {
+    fn begins() -> Self {
+        Self {
+            since: Instant::now(),
+            failures: 0,
         }
     }
 }

@@ -6,6 +6,7 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use chefshat_client::Client;
+use chefshat_postgres::own_address;
 use chefshat_proto::v1;
 use chefshat_proto::v1::participation_service_client::ParticipationServiceClient;
 use serde_json::Value;
@@ -52,7 +53,8 @@ fn a_study_is_created_and_deleted() {
 fn a_study_is_followed_across_the_death_of_its_server() {
     let folder = TempDir::new().unwrap();
     let (data, owner) = (folder.path().join("data"), folder.path().join("owner"));
-    let (server, url) = serve(&data);
+    // Only this server listens there.
+    let (server, url) = serve_at(&format!("{}:0", own_address()), &data, &[]);
     let id = create(&url, &owner);
     let owned = format!("{id} --json --owner-file {}", owner.display());
     let mut following = Running::start(&url, &format!("study follow {owned}"));
@@ -61,6 +63,11 @@ fn a_study_is_followed_across_the_death_of_its_server() {
     let first = lines.next().unwrap();
     assert_eq!(first["study"]["studyId"], id);
     drop(server);
+    // It has tried to connect while there was none.
+    let mut said = String::new();
+    let mut stderr = BufReader::new(following.0.stderr.take().unwrap());
+    stderr.read_line(&mut said).unwrap();
+    assert!(said.contains("retrying for up to 30 seconds"), "{said}");
     let address = url.trim_start_matches("http://");
     let (_server, _) = serve_at(address, &data, &[]);
     run(&url, &format!("study close {owned}")).well();
