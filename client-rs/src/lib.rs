@@ -39,6 +39,8 @@ pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
+#[doc(hidden)]
+pub use repeat::repeated;
 pub use spectate::{Spectator, Watched};
 pub use table::TableFollower;
 pub use ticket_follower::{Followed, SeatFollower, TicketFollower};

@@ -46,7 +46,11 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
 
 /// Sends a request, and again if the connection is lost before its response arrives, the server of
 /// its room or tournament cannot be reached, or the server is stopping or is not reached by others yet.
-pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
+/// For a request that changes nothing, or whose id tells the server that it is the same.
+///
+/// # Errors
+/// The last failure.
+pub async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
 {

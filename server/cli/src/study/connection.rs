@@ -1,6 +1,7 @@
 //! The connection of the commands to the server's studies.
 
-use chefshat_client::{Connection, Error, MAX_RESPONSE_BYTES};
+use chefshat_client::{Connection, Error, MAX_RESPONSE_BYTES, repeated};
+use chefshat_proto::v1;
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
 
 use crate::CommandError;
@@ -12,6 +13,23 @@ pub(super) async fn service(
 ) -> Result<StudyServiceClient<Connection>, CommandError> {
     let service = StudyServiceClient::new(server.connect().await?.channel());
     Ok(service.max_decoding_message_size(MAX_RESPONSE_BYTES))
+}
+
+/// A study and its participants.
+pub(super) async fn get_study(
+    service: &StudyServiceClient<Connection>,
+    study_id: &str,
+    owner_token: &str,
+) -> Result<v1::GetStudyResponse, Error> {
+    repeated(|| {
+        let mut service = service.clone();
+        let request = v1::GetStudyRequest {
+            study_id: study_id.to_owned(),
+            owner_token: owner_token.to_owned(),
+        };
+        async move { service.get_study(request).await }
+    })
+    .await
 }
 
 /// A refusal, for people.

@@ -11,12 +11,13 @@ mod trial;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use chefshat_client::repeated;
 use chefshat_proto::v1;
 use chefshat_room::ids::random_bytes;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use self::connection::{refused, service};
+use self::connection::service;
 use super::connect::ServerArg;
 use super::secret_file::SecretFile;
 use super::{CommandError, say};
@@ -103,7 +104,7 @@ struct Create {
 impl Create {
     async fn run(self) -> Result<(), CommandError> {
         let settings = file::settings(&self.file)?;
-        let mut service = service(&self.server).await?;
+        let service = service(&self.server).await?;
         let owner_file = (self.owner_file.as_deref())
             .map(SecretFile::for_owner)
             .transpose()?;
@@ -111,8 +112,11 @@ impl Create {
             settings: Some(settings),
             request_id: random_bytes::<32>().to_vec(),
         };
-        let created = service.create_study(request).await.map_err(refused)?;
-        let created = created.into_inner();
+        let created = repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.create_study(request).await }
+        });
+        let created = created.await?;
         let study = created.study.ok_or("the server did not return the study")?;
         let owner = created.owner_token;
         let written = owner_file.map(|file| file.write(&owner));

@@ -6,14 +6,14 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use chefshat_client::{Connection, Error};
+use chefshat_client::{Connection, Error, repeated};
 use chefshat_proto::v1;
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
 use chrono::{DateTime, SecondsFormat};
 use clap::Args;
 use serde_json::json;
 
-use super::connection::{refused, service};
+use super::connection::{get_study, refused, service};
 use crate::connect::{OwnerArgs, PATIENCE, ServerArg};
 use crate::numbers::counted;
 use crate::{CommandError, say};
@@ -165,10 +165,13 @@ impl List {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         // The operator needs none.
         let owner_tokens = self.owner.token().ok().into_iter().collect();
-        let mut service = service(&self.server).await?;
+        let service = service(&self.server).await?;
         let request = v1::ListStudiesRequest { owner_tokens };
-        let listed = service.list_studies(request).await.map_err(refused)?;
-        for study in listed.into_inner().studies {
+        let listed = repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.list_studies(request).await }
+        });
+        for study in listed.await?.studies {
             match self.json {
                 true => say(json!(study))?,
                 false => say(summary(&study))?,
@@ -181,13 +184,8 @@ impl List {
 impl Show {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         let owned = self.owned;
-        let mut service = service(&owned.server).await?;
-        let request = v1::GetStudyRequest {
-            study_id: owned.study_id.clone(),
-            owner_token: owned.owner.token()?,
-        };
-        let shown = service.get_study(request).await.map_err(refused)?;
-        let shown = shown.into_inner();
+        let service = service(&owned.server).await?;
+        let shown = get_study(&service, &owned.study_id, &owned.owner.token()?).await?;
         if owned.json {
             return say(json!(shown));
         }
@@ -214,8 +212,11 @@ impl Links {
                 study_id,
                 owner_token,
             };
-            let listed = service.list_study_links(request).await.map_err(refused)?;
-            listed.into_inner().links
+            let listed = repeated(|| {
+                let (mut service, request) = (service.clone(), request.clone());
+                async move { service.list_study_links(request).await }
+            });
+            listed.await?.links
         } else {
             let request = v1::AddStudyParticipantsRequest {
                 study_id,
@@ -349,14 +350,17 @@ impl Export {
         if self.out.exists() {
             return Err(format!("--out: {out} exists; choose a new folder").into());
         }
-        let mut service = service(&owned.server).await?;
+        let service = service(&owned.server).await?;
         let request = v1::ExportStudyRequest {
             study_id: owned.study_id.clone(),
             owner_token: owned.owner.token()?,
             test: self.test,
         };
-        let exported = service.export_study(request).await.map_err(refused)?;
-        let mut parts = exported.into_inner();
+        let exported = repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.export_study(request).await }
+        });
+        let mut parts = exported.await?;
         let mut sizes: BTreeMap<String, u64> = BTreeMap::new();
         let mut open: Option<(String, File)> = None;
         while let Some(part) = parts.message().await.map_err(refused)? {

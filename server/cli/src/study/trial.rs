@@ -21,7 +21,7 @@ use tokio::sync::watch;
 use tokio_util::task::AbortOnDropHandle;
 use tonic::{Status, Streaming};
 
-use super::connection::{refused, service};
+use super::connection::{get_study, refused, service};
 use super::owner::{Owned, line};
 use crate::numbers::counted;
 use crate::remote::{RemoteAgent, named_agent, seed_for};
@@ -55,12 +55,8 @@ impl Test {
         let owned = &self.owned;
         let mut researcher = service(&owned.server).await?;
         let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
-        let request = v1::GetStudyRequest {
-            study_id: study_id.clone(),
-            owner_token: owner_token.clone(),
-        };
-        let shown = researcher.get_study(request).await.map_err(refused)?;
-        let settings = shown.into_inner().study.and_then(|it| it.settings);
+        let shown = get_study(&researcher, &study_id, &owner_token).await?;
+        let settings = shown.study.and_then(|it| it.settings);
         let size = (settings.and_then(|it| it.groups)).map_or(1, |groups| groups.size.max(1));
         let wanted = self.participants.unwrap_or(8);
         let whole = wanted.next_multiple_of(size);
@@ -82,12 +78,8 @@ impl Test {
         // Those of a group wait for each other.
         let at_once = self.at_once.next_multiple_of(size) as usize;
         let problems = self.take_part(links, at_once).await?;
-        let request = v1::GetStudyRequest {
-            study_id,
-            owner_token,
-        };
-        let shown = researcher.get_study(request).await.map_err(refused)?;
-        let mut participants = shown.into_inner().participants;
+        let shown = get_study(&researcher, &study_id, &owner_token).await?;
+        let mut participants = shown.participants;
         participants.retain(|it| numbers.contains(&it.number));
         let count = |state| participants.iter().filter(|it| it.state() == state).count();
         let completed = count(v1::StudyParticipantState::Completed);

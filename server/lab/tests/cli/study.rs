@@ -2,8 +2,10 @@
 //! deleted.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{BufRead as _, BufReader};
+use std::io::{self, BufRead as _, BufReader, Read as _};
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
+use std::thread;
 
 use chefshat_client::Client;
 use chefshat_postgres::own_address;
@@ -75,6 +77,53 @@ fn a_study_is_followed_across_the_death_of_its_server() {
     let rest: Vec<Value> = lines.collect();
     assert!(!rest.is_empty() && !rest.contains(&first), "{rest:?}");
     assert_eq!(following.0.wait().unwrap().code(), Some(0));
+}
+
+/// Type of the frame of HTTP/2 that begins a request.
+const HEADERS: u8 = 1;
+
+/// The URL of a relay to a server that loses its first connection once a request was sent.
+fn losing_a_request(url: &str) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let relay = listener.local_addr().unwrap();
+    let server = url.trim_start_matches("http://").to_owned();
+    thread::spawn(move || {
+        let (mut lost, _) = listener.accept().unwrap();
+        // The preface, then frames: length, type, flags, stream, content.
+        lost.read_exact(&mut [0; 24]).unwrap();
+        let mut frame = [0; 9];
+        while frame[3] != HEADERS {
+            lost.read_exact(&mut frame).unwrap();
+            let length = u32::from_be_bytes([0, frame[0], frame[1], frame[2]]);
+            io::copy(&mut (&lost).take(length.into()), &mut io::sink()).unwrap();
+        }
+        drop(lost);
+        for client in listener.incoming() {
+            let (client, server) = (client.unwrap(), TcpStream::connect(&server).unwrap());
+            for (from, to) in [(&client, &server), (&server, &client)] {
+                let (mut from, mut to) = (from.try_clone().unwrap(), to.try_clone().unwrap());
+                thread::spawn(move || io::copy(&mut from, &mut to));
+            }
+        }
+    });
+    format!("http://{relay}")
+}
+
+#[test]
+fn requests_for_a_study_are_repeated_if_their_connection_is_lost() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let (owner, out) = (folder.path().join("owner"), folder.path().join("out"));
+    let id = create(&losing_a_request(&url), &owner);
+    for command in [
+        "list".to_owned(),
+        format!("show {id}"),
+        format!("links {id}"),
+        format!("export {id} --out {}", out.display()),
+    ] {
+        let line = format!("study {command} --owner-file {}", owner.display());
+        run(&losing_a_request(&url), &line).well();
+    }
 }
 
 #[test]
