@@ -134,7 +134,10 @@ pub struct OwnerArgs {
 
 impl OwnerArgs {
     /// The owner token, if there is one; the file has priority over the environment.
-    fn given(&self) -> Result<Option<String>, CommandError> {
+    ///
+    /// # Errors
+    /// The file is unreadable.
+    pub(crate) fn given(&self) -> Result<Option<String>, CommandError> {
         match &self.owner_file {
             Some(file) => std::fs::read_to_string(file)
                 .map(|text| Some(text.trim().to_owned()))

@@ -164,20 +164,21 @@ impl Delete {
 impl List {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         // The operator needs none.
-        let owner_tokens = self.owner.token().ok().into_iter().collect();
+        let owner_tokens = self.owner.given()?.into_iter().collect();
         let service = service(&self.server).await?;
         let request = v1::ListStudiesRequest { owner_tokens };
         let listed = repeated(|| {
             let (mut service, request) = (service.clone(), request.clone());
             async move { service.list_studies(request).await }
         });
-        for study in listed.await?.studies {
-            match self.json {
-                true => say(json!(study))?,
-                false => say(summary(&study))?,
-            }
+        let studies = listed.await?.studies;
+        if studies.is_empty() && !self.json {
+            return say("no studies");
         }
-        Ok(())
+        studies.iter().try_for_each(|study| match self.json {
+            true => say(json!(study)),
+            false => say(summary(study)),
+        })
     }
 }
 

@@ -145,6 +145,17 @@ fn an_owner_token_whose_file_cannot_be_written_is_printed() {
     run(&url, &format!("study show {id} --owner-token {token}")).well();
 }
 
+#[test]
+fn studies_are_listed_with_the_owner_token_of_a_file_that_exists() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    assert_eq!(run(&url, "study list").clean().stdout, "no studies\n");
+    assert_eq!(run(&url, "study list --json").clean().stdout, "");
+    let missing = folder.path().join("ownerr");
+    let list = format!("study list --owner-file {}", missing.display());
+    run(&url, &list).assert_failed("--owner-file: ");
+}
+
 /// The example of the documentation with pairs.
 const PAIRS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/studies/pairs.toml");
 
