@@ -16,6 +16,7 @@ use chefshat_server::store::{DATABASE_FILE, DatabaseCopy, LOCK_FILE, check_copy,
 use clap::Args;
 use serde_json::json;
 
+use super::new_folder::{NewFolder, at};
 use super::numbers::counted;
 use super::{CommandError, data_dir, say};
 
@@ -44,26 +45,8 @@ impl Backup {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let source = data_dir::name(self.data_dir)?;
         let target = self.target;
-        if target.exists() {
-            let target = target.display();
-            return Err(format!("{target} exists already; name a new folder").into());
-        }
-        let name = target
-            .file_name()
-            .ok_or("name the folder to create, for example backups/monday")?;
-        let parent = match target.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        // Only its owner can open it. Removed if anything fails.
-        let prefix = [name, OsStr::new(".")].join(OsStr::new(""));
-        let mut part = tempfile::Builder::new();
-        part.prefix(&prefix).suffix(".part");
-        #[cfg(unix)]
-        part.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
-        let part = part
-            .tempdir_in(parent)
-            .map_err(|error| at(parent, &error))?;
+        // Only its owner can open it.
+        let part = NewFolder::beside(&target, 0o700)?;
         // A record that is written later belongs to a game that the copy of the database may know
         // as unfinished.
         let mut records = names(&folder_of(&source))?;
@@ -79,8 +62,7 @@ impl Backup {
         let records = copy_files(&folder_of(&source), &folder_of(part.path()), &records)?;
         copy_samples(&source, part.path())?;
         sync();
-        fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
-        sync_folder_of(&target).map_err(|error| at(&target, &error))?;
+        part.finish()?;
         report(self.json, "backup", &target, &copied, records, "")
     }
 }
@@ -251,8 +233,4 @@ fn copy_file(from: &Path, to: &Path) -> Result<bool, CommandError> {
     };
     copy().map_err(|error| at(to, &error))?;
     Ok(true)
-}
-
-fn at(path: &Path, error: &io::Error) -> CommandError {
-    format!("{}: {error}", path.display()).into()
 }

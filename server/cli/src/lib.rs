@@ -29,6 +29,7 @@ mod llm;
 mod migrate;
 pub mod name_key;
 pub mod narration;
+mod new_folder;
 pub mod numbers;
 pub mod output;
 mod pages;

@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::connection::{get_study, refused, service};
 use crate::connect::{OwnerArgs, PATIENCE, ServerArg};
+use crate::new_folder::{NewFolder, at};
 use crate::numbers::counted;
 use crate::{CommandError, say};
 
@@ -90,7 +91,7 @@ pub(super) struct Follow {
 pub(super) struct Export {
     #[command(flatten)]
     owned: Owned,
-    /// The folder, which must not exist yet.
+    /// The folder, which must not exist yet. It appears when the export is complete.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// The data of test participants, instead of those of all others.
@@ -347,10 +348,11 @@ impl Shown {
 impl Export {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         let owned = self.owned;
-        let out = self.out.display();
-        if self.out.exists() {
-            return Err(format!("--out: {out} exists; choose a new folder").into());
+        if let Some(parent) = self.out.parent() {
+            fs::create_dir_all(parent).map_err(|error| at(parent, &error))?;
         }
+        let folder =
+            NewFolder::beside(&self.out, 0o777).map_err(|error| format!("--out: {error}"))?;
         let service = service(&owned.server).await?;
         let request = v1::ExportStudyRequest {
             study_id: owned.study_id.clone(),
@@ -367,18 +369,17 @@ impl Export {
         while let Some(part) = parts.message().await.map_err(refused)? {
             let file = match open.take().filter(|(name, _)| *name == part.file) {
                 Some((_, file)) => file,
-                None => create(&self.out, &part.file)?,
+                None => create(folder.path(), &part.file)?,
             };
             let (_, file) = open.insert((part.file.clone(), file));
-            file.write_all(&part.data)?;
+            let written = file.write_all(&part.data);
+            written.map_err(|error| at(&folder.path().join(&part.file), &error))?;
             *sizes.entry(part.file).or_default() += part.data.len() as u64;
         }
         if !sizes.contains_key(LAST_FILE) {
-            return Err(format!(
-                "the server ended the export before it was complete; delete {out} and export again"
-            )
-            .into());
+            return Err("the server ended the export before it was complete; export again".into());
         }
+        folder.finish()?;
         let (records, files): (Vec<_>, Vec<_>) = sizes
             .iter()
             .partition(|(name, _)| name.starts_with("records/"));
@@ -399,14 +400,13 @@ fn create(folder: &Path, name: &str) -> Result<File, CommandError> {
         !part.is_empty() && !part.starts_with('.') && part.chars().all(allowed)
     };
     if name.split('/').count() > 2 || !name.split('/').all(is_plain) {
-        return Err(format!("the server named a file {name:?}; nothing more is written").into());
+        return Err(format!("the server named a file {name:?}; nothing is written").into());
     }
     let path = folder.join(name);
     if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent)?;
+        fs::create_dir_all(parent).map_err(|error| at(parent, &error))?;
     }
-    let created = File::create_new(&path);
-    created.map_err(|error| format!("{}: {error}", path.display()).into())
+    File::create_new(&path).map_err(|error| at(&path, &error))
 }
 
 impl Owned {

@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use super::run::{
-    Ended, Running, chefshat, in_runtime, run, serve, serve_at, typed_on_a_full_disk,
+    Ended, Running, chefshat, in_runtime, run, serve, serve_at, typed, typed_on_a_full_disk,
 };
 
 /// The example of the documentation.
@@ -154,6 +154,24 @@ fn studies_are_listed_with_the_owner_token_of_a_file_that_exists() {
     let missing = folder.path().join("ownerr");
     let list = format!("study list --owner-file {}", missing.display());
     run(&url, &list).assert_failed("--owner-file: ");
+}
+
+#[test]
+fn an_export_that_fails_leaves_no_folder() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let owner = folder.path().join("owner");
+    let id = create(&url, &owner);
+    let exports = folder.path().join("exports");
+    let export = format!(
+        "study export {id} --out {}",
+        exports.join("monday").display()
+    );
+    let export = format!("{export} --owner-file {} --server {url}", owner.display());
+    typed_on_a_full_disk(&export).assert_failed(exports.to_str().unwrap());
+    assert_eq!(exports.read_dir().unwrap().count(), 0);
+    typed(&export).well();
+    assert!(exports.join("monday/datapackage.json").exists());
 }
 
 /// The example of the documentation with pairs.
@@ -413,7 +431,7 @@ fn a_study_is_listed_shown_exported_and_closed_and_participants_leave_it() {
         data.contains("Anabel") && data.contains("Bonifaz"),
         "{data}"
     );
-    owned("export", &out).assert_failed("exists; choose a new folder");
+    owned("export", &out).assert_failed("exists already; name a new folder");
 
     let deleted = owned("delete-participant", "1").well();
     let words = "the data of participant 1 are deleted, with 0 games\n";
