@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 
 use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
+use tokio::runtime::{Builder, Runtime};
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer as _, fmt};
@@ -90,10 +91,25 @@ fn is_broken_pipe(error: &CommandError) -> bool {
 pub fn in_runtime(
     command: impl Future<Output = Result<ExitCode, CommandError>>,
 ) -> Result<ExitCode, CommandError> {
-    tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()?
-        .block_on(command)
+    runtime()?.block_on(command)
+}
+
+/// [`in_runtime`] for a command that reads standard input by tokio. Its end does not wait for the
+/// thread that reads, which only more input would wake.
+///
+/// # Errors
+/// As [`in_runtime`].
+pub fn in_runtime_with_input(
+    command: impl Future<Output = Result<ExitCode, CommandError>>,
+) -> Result<ExitCode, CommandError> {
+    let runtime = runtime()?;
+    let result = runtime.block_on(command);
+    runtime.shutdown_background();
+    result
+}
+
+fn runtime() -> io::Result<Runtime> {
+    Builder::new_multi_thread().enable_all().build()
 }
 
 fn start_logging<C: Commands>(cli: &CommandLine<C>) -> Result<Tracing, CommandError> {

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use chefshat_cli::ServerCommand;
 use chefshat_cli::error::CommandError;
-use chefshat_cli::program::{self, Commands, Invocation, in_runtime};
+use chefshat_cli::program::{self, Commands, Invocation, in_runtime, in_runtime_with_input};
 use clap::Subcommand;
 
 /// As in `chefshat`.
@@ -65,7 +65,7 @@ impl Commands for Command {
             Self::Experiment(command) => command.run(),
             Self::CheckAgent(command) => in_runtime(command.run()),
             Self::Conformance(command) => command.run(),
-            Self::Mcp(command) => in_runtime(command.run()),
+            Self::Mcp(command) => in_runtime_with_input(command.run()),
         }
     }
 

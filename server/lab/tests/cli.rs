@@ -20,6 +20,7 @@ mod cli {
     mod export;
     mod import;
     mod listen;
+    mod mcp;
     mod migrate;
     mod participant;
     mod ratings;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 /// Widest line of a table.
@@ -16,7 +17,7 @@ const COLUMNS: usize = 100;
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Waits until a condition holds.
-pub(super) fn until(what: &str, holds: impl Fn() -> bool) {
+pub(super) fn until(what: &str, mut holds: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !holds() {
         assert!(begun.elapsed() < PATIENCE, "waited too long for {what}");
@@ -204,6 +205,11 @@ impl Running {
         command.args(line.split_whitespace());
         command.args(["--server", server]);
         Self(command.spawn().unwrap())
+    }
+
+    /// Asks it to stop, as an operating system does.
+    pub(super) fn terminate(&self) {
+        kill_process(Pid::from_child(&self.0), Signal::TERM).unwrap();
     }
 
     /// Waits for the end. Returns the exit code and the lines of output.
