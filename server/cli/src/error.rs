@@ -10,3 +10,8 @@ pub type CommandError = Box<dyn std::error::Error + Send + Sync>;
 pub fn say(line: impl Display) -> Result<(), CommandError> {
     Ok(writeln!(io::stdout().lock(), "{line}")?)
 }
+
+/// Writes a line to standard error, for a program that runs on if nobody can read it.
+pub(crate) fn tell(line: impl Display) {
+    let _ = writeln!(anstream::stderr().lock(), "{line}");
+}

@@ -9,6 +9,8 @@ use anstyle::{Ansi256Color, Style};
 use qrcode::QrCode;
 use qrcode::render::unicode::Dense1x2;
 
+use super::error::tell;
+
 /// Addresses for documentation (RFC 5737, RFC 3849): the route to them is the route to the internet.
 const FAR_AWAY: [IpAddr; 2] = [
     IpAddr::V4(Ipv4Addr::new(192, 0, 2, 1)),
@@ -33,12 +35,12 @@ pub(super) fn print_addresses(listening_on: SocketAddr, scheme: &str) {
     }
     let urls = urls(listening_on, scheme, &own_addresses());
     for url in &urls {
-        anstream::eprintln!("in a browser of this network: {url}");
+        tell(format_args!("in a browser of this network: {url}"));
     }
     if let Some(code) = (urls.first()).and_then(|url| qr_code(url))
         && io::stderr().is_terminal()
     {
-        anstream::eprintln!("{code}");
+        tell(format_args!("{code}"));
     }
 }
 

@@ -12,6 +12,7 @@ use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 
 use super::cluster::{NewNode, NodeSettings};
+use super::error::tell;
 use super::listen::{self, Address};
 use super::numbers::duration;
 use super::stops::Stops;
@@ -199,10 +200,10 @@ impl Settings {
             })),
             (None, None, None) => {
                 if !address.is_local() {
-                    eprintln!(
+                    tell(format_args!(
                         "WARNING: connections to {address} are not encrypted: others can read tokens and tickets on the way; use \
                          --tls-cert and --tls-key, or a proxy with TLS"
-                    );
+                    ));
                 }
                 Ok(None)
             }
@@ -237,10 +238,10 @@ impl Settings {
                 )
                 .into());
             }
-            eprintln!(
+            tell(format_args!(
                 "WARNING: {address} is open: anyone who reaches it can create rooms, play, and read records; create tokens with \
                  `chefshat token create`"
-            );
+            ));
         }
         Ok((settings, mode))
     }
@@ -361,23 +362,27 @@ impl Serve {
             Storage::Shared(node) => {
                 let (name, endpoint) = (node.info.name.clone(), node.info.peer_endpoint.clone());
                 let server = Server::joined(config, node.store, node.info).await?;
-                eprintln!("node {name} of a cluster; other nodes reach it at {endpoint}");
+                tell(format_args!(
+                    "node {name} of a cluster; other nodes reach it at {endpoint}"
+                ));
                 server.with_peers(node.port)
             }
             Storage::Own(store) => {
                 let server = Server::restored(config, store).await?;
                 if let Some(folder) = kept_in {
-                    eprintln!("games are stored in {}", folder.display());
+                    tell(format_args!("games are stored in {}", folder.display()));
                 }
                 server
             }
         };
         if server.games() > 0 {
-            eprintln!("resumed games: {}", server.games());
+            tell(format_args!("resumed games: {}", server.games()));
         }
         if server.access().mode() == Mode::Tokens {
             let tokens = server.access().tokens();
-            eprintln!("calls need a token; tokens: {tokens} (see `chefshat token`)");
+            tell(format_args!(
+                "calls need a token; tokens: {tokens} (see `chefshat token`)"
+            ));
         }
         if self.json {
             say(serde_json::json!({
@@ -387,17 +392,17 @@ impl Serve {
                 "games": server.games(),
             }))?;
         }
-        eprintln!("listening on {}", address.url(scheme));
+        tell(format_args!("listening on {}", address.url(scheme)));
         if let Address::Ip(address) = &address {
             lan::print_addresses(*address, scheme);
         }
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
-            eprintln!("metrics at http://{address}/metrics");
+            tell(format_args!("metrics at http://{address}/metrics"));
             let metrics = Arc::clone(server.metrics());
             tokio::spawn(scrape::serve(listener, metrics, metrics_names));
         }
         if !web::is_built() {
-            eprintln!("the web page is not built yet; `cargo xtask web` builds it");
+            tell("the web page is not built yet; `cargo xtask web` builds it");
         }
         #[cfg(target_os = "linux")]
         tell_systemd(sd_notify::NotifyState::Ready);
@@ -421,15 +426,19 @@ impl Serve {
                     "durable games resume when the server is started again",
                 ),
             };
-            eprintln!("stopping: no new rooms; {then}; stop again to end at once");
+            tell(format_args!(
+                "stopping: no new rooms; {then}; stop again to end at once"
+            ));
             tokio::spawn(async move {
                 stops.next().await;
-                eprintln!("stopped at once: {at_once}, all others are lost");
+                tell(format_args!(
+                    "stopped at once: {at_once}, all others are lost"
+                ));
                 std::process::exit(1);
             });
         };
         server.serve(listener, stop).await?;
-        eprintln!("stopped");
+        tell("stopped");
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, Running, program, run, typed};
+use super::run::{Ended, Running, closed_pipe, program, run, typed};
 
 /// Opens a socket and becomes the server, as systemd does.
 const ACTIVATE: &str = "
@@ -58,6 +58,15 @@ fn a_server_listens_on_a_unix_socket_again_and_again() {
     let unsaid = format!("serve --no-records --listen unix:{}", path.display());
     std::fs::remove_file(&path).unwrap();
     typed(&unsaid).assert_failed("say --access open");
+}
+
+#[test]
+fn a_server_whose_messages_nobody_can_read_starts_and_stops() {
+    let folder = TempDir::new().unwrap();
+    let mut command = serve_at(&folder.path().join("chefshat.sock"));
+    let (mut server, _) = start(command.stderr(closed_pipe()));
+    server.terminate();
+    assert_eq!(server.0.wait().unwrap().code(), Some(0));
 }
 
 /// The answer of a server to a request for the page of a host.

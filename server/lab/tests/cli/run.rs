@@ -1,7 +1,7 @@
 //! Runs the program: to its end, in the background, and as a server. Expectations common to all
 //! commands: tables that fit, explained errors.
 
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, PipeWriter};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -185,6 +185,12 @@ pub(super) fn typed_on_a_full_disk(line: &str) -> Ended {
     let script = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
     shell.args(["-c", script, "sh", env!("CARGO_BIN_EXE_chefshat-lab")]);
     Ended::of(shell.args(line.split_whitespace()).output().unwrap())
+}
+
+/// A pipe that its reader has closed, as `head` does.
+pub(super) fn closed_pipe() -> PipeWriter {
+    let (_, writer) = std::io::pipe().unwrap();
+    writer
 }
 
 /// A process that is killed at the end of the test.
