@@ -15,3 +15,11 @@ pub fn say(line: impl Display) -> Result<(), CommandError> {
 pub(crate) fn tell(line: impl Display) {
     let _ = writeln!(anstream::stderr().lock(), "{line}");
 }
+
+/// Whether the reader of the output has closed it, as `head` does. A command returns this error
+/// unchanged, and ends well.
+pub fn is_broken_pipe(error: &CommandError) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}

@@ -12,7 +12,7 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer as _, fmt};
 
 pub use crate::config::Invocation;
-use crate::error::CommandError;
+use crate::error::{CommandError, is_broken_pipe};
 
 /// The commands of a program.
 pub trait Commands: Subcommand {
@@ -76,12 +76,6 @@ pub fn run<C: Commands>() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-fn is_broken_pipe(error: &CommandError) -> bool {
-    error
-        .downcast_ref::<io::Error>()
-        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }
 
 /// Runs a command on tokio's threads.

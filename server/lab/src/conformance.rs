@@ -11,7 +11,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, is_broken_pipe};
 use chefshat_cli::progress;
 
 const HELP: &str = "\
@@ -40,12 +40,14 @@ impl Conformance {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let mut code = ExitCode::SUCCESS;
         for file in &self.files {
-            let checked = self.check_file(file).unwrap_or_else(|error| {
-                anstream::eprintln!("chefshat: {error}");
-                false
-            });
-            if !checked {
-                code = ExitCode::FAILURE;
+            match self.check_file(file) {
+                Ok(true) => {}
+                Ok(false) => code = ExitCode::FAILURE,
+                Err(error) if is_broken_pipe(&error) => return Err(error),
+                Err(error) => {
+                    anstream::eprintln!("chefshat: {error}");
+                    code = ExitCode::FAILURE;
+                }
             }
         }
         Ok(code)

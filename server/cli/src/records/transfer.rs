@@ -15,6 +15,7 @@ use prost::Message as _;
 use tonic::Code;
 
 use super::super::connect::{SecretArgs, ServerArg};
+use super::super::error::is_broken_pipe;
 use super::super::numbers::counted;
 use super::super::{CommandError, progress, say};
 use super::filter::FilterArgs;
@@ -137,6 +138,7 @@ impl Stream {
         if let Err(error) = streamed {
             return Err(match received.last.as_str() {
                 "" => error,
+                _ if is_broken_pipe(&error) => error,
                 last => format!("{error}\nresume with --after {last}").into(),
             });
         }

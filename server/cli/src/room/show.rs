@@ -1,5 +1,6 @@
 //! `chefshat room list` and `chefshat room show`.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use chefshat_client::v1;
@@ -82,7 +83,7 @@ impl Show {
         if self.json {
             say(serde_json::to_string(&room)?)?;
         } else {
-            print!("{}", in_full(&room));
+            write!(anstream::stdout(), "{}", in_full(&room))?;
         }
         Ok(ExitCode::SUCCESS)
     }

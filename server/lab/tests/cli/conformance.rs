@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat, fixture};
+use super::run::{Ended, chefshat, fixture, typed_into_a_closed_pipe};
 
 fn vectors(file: &str) -> PathBuf {
     fixture(&format!("vectors/{file}"))
@@ -68,6 +68,12 @@ fn the_vectors_agree() {
             (json!(counts.0), json!(counts.1), json!(counts.2))
         );
     }
+}
+
+#[test]
+fn a_report_into_a_closed_pipe_ends_well() {
+    let file = vectors("deals.jsonl");
+    typed_into_a_closed_pipe(&format!("conformance {}", file.display())).clean();
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::run::{chefshat, fixture, run, serve, serve_with};
+use super::run::{chefshat, fixture, run, serve, serve_with, typed_into_a_closed_pipe};
 
 /// The records that a server lists, oldest first.
 fn listed(server: &str) -> Vec<String> {
@@ -45,6 +45,19 @@ fn a_download_is_resumed_after_the_last_record_that_arrived() {
     assert!(nothing.is_empty(), "{nothing:?}");
     let unknown = format!("records stream --after {}", "0".repeat(32));
     run(&url, &unknown).assert_failed("no game");
+}
+
+#[test]
+fn a_download_into_a_closed_pipe_ends_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_server, url) = serve_with(folder.path(), &["--allow-import"]);
+    for name in ["committed", "fixed"] {
+        let file = fixture(&format!("records/{name}.jsonl"));
+        run(&url, &format!("records import {}", file.display())).clean();
+    }
+    let first = &listed(&url)[0];
+    let stream = format!("records stream --after {first} --server {url}");
+    typed_into_a_closed_pipe(&stream).clean();
 }
 
 #[test]

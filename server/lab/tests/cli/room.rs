@@ -6,7 +6,7 @@ use std::io::{BufRead as _, BufReader};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Running, run, serve, typed};
+use super::run::{Running, run, serve, typed, typed_into_a_closed_pipe};
 
 /// The only line that an agent printed, as JSON.
 fn only_line(lines: &[String]) -> Value {
@@ -71,6 +71,7 @@ fn rooms_are_listed_shown_and_closed() {
     let shown = run(&url, &format!("room show {room_id}"));
     shown.assert_says(&["quiet", "waiting", "greedy, played by the server"]);
     shown.assert_says(&["free for humans", "free for anyone"]);
+    typed_into_a_closed_pipe(&format!("room show {room_id} --server {url}")).clean();
 
     let close = format!("room close {room_id} --json --owner-token");
     run(&url, &format!("{close} nonsense")).assert_failed("OWNER_TOKEN_WRONG");

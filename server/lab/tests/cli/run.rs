@@ -193,6 +193,13 @@ pub(super) fn closed_pipe() -> PipeWriter {
     writer
 }
 
+/// Runs a command line whose output is closed by its reader.
+pub(super) fn typed_into_a_closed_pipe(line: &str) -> Ended {
+    let mut program = program();
+    program.args(line.split_whitespace()).stdout(closed_pipe());
+    Ended::of(program.output().unwrap())
+}
+
 /// A process that is killed at the end of the test.
 pub(super) struct Running(pub(super) Child);
 
