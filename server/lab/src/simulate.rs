@@ -21,6 +21,7 @@ use chefshat_cli::error::CommandError;
 use chefshat_cli::numbers::grouped;
 use chefshat_cli::rules_args::RulesArgs;
 use chefshat_cli::{progress, threads};
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 
 const EXAMPLES: &str = "\
@@ -75,6 +76,9 @@ fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
 impl Simulate {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let batch = self.batch()?;
+        if let Some(folder) = &self.records {
+            check_writable(folder)?;
+        }
         let pool = threads::pool(self.threads, batch.games())?;
         let bar = progress::of_items(batch.games(), "games");
         let start = Instant::now();
@@ -83,15 +87,15 @@ impl Simulate {
         if !bar.is_hidden() {
             say_speed(&table, start.elapsed().as_secs_f64());
         }
-        if let Some(folder) = &self.records {
-            pool.install(|| write_records(&batch, folder))?;
-        }
+        let records = self.records.as_deref();
+        let written = records.map(|folder| pool.install(|| write_records(&batch, folder)));
         let mut out = anstream::stdout().lock();
         if self.json {
             writeln!(out, "{}", report::json(&batch, &table))?;
         } else {
             write!(out, "{}", report::text(&batch, &table))?;
         }
+        written.transpose()?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -144,6 +148,16 @@ fn check_repeatable(agents: &[NamedAgent]) -> Result<(), CommandError> {
         )
         .into()),
     }
+}
+
+/// Creates the folder of the records before the games, so that none is played for a folder that cannot
+/// be written to.
+fn check_writable(folder: &Path) -> Result<(), CommandError> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("--records: {}: {error}", folder.display()))?;
+    // Removed at once.
+    AtomicFile::create(&folder.join("games"))?;
+    Ok(())
 }
 
 /// Writes the records of all games on the current thread pool.

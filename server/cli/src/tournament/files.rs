@@ -27,11 +27,11 @@ const FINAL_RESULTS: [&str; 4] = [
 /// # Errors
 /// The file cannot be written.
 pub(super) fn write_standings(
-    path: &Path,
+    file: AtomicFile,
     results: &v1::GetTournamentResultsResponse,
 ) -> Result<(), CommandError> {
     let (header, rows) = standings(results);
-    write(path, Terminator::Any(b'\n'), &header, rows)
+    write(file, Terminator::Any(b'\n'), &header, rows)
 }
 
 /// Writes the columns of the reference implementation.
@@ -46,7 +46,7 @@ pub(super) fn write_final_results(
     let header = FINAL_RESULTS.map(str::to_owned);
     // Line ends of Python's csv module.
     write(
-        path,
+        AtomicFile::create(path)?,
         Terminator::CRLF,
         &header,
         final_results(results, games),
@@ -58,12 +58,11 @@ pub(super) fn write_final_results(
 /// # Errors
 /// The file cannot be written; an existing file is unchanged.
 fn write(
-    path: &Path,
+    mut file: AtomicFile,
     terminator: Terminator,
     header: &[String],
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<(), CommandError> {
-    let mut file = AtomicFile::create(path)?;
     let mut writer = WriterBuilder::new()
         .terminator(terminator)
         .from_writer(&mut file);

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_client::v1;
+use chefshat_record::atomic_file::AtomicFile;
 use clap::Args;
 
 use super::super::connect::{SecretArgs, ServerArg};
@@ -53,7 +54,7 @@ impl Results {
             .tournament_results(self.tournament_id.as_str())
             .await?;
         if let Some(file) = &self.csv {
-            files::write_standings(file, &results)?;
+            files::write_standings(AtomicFile::create(file)?, &results)?;
         }
         if let Some(file) = &self.final_results {
             let games = all_games(&client, &self.tournament_id).await?;

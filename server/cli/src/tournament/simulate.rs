@@ -9,6 +9,7 @@ use std::time::Instant;
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_simulation::RulesForm;
 use chefshat_simulation::tournament::play_offline;
 use chefshat_tournament::{
@@ -82,6 +83,8 @@ impl Simulate {
     pub(super) fn run(&self) -> Result<ExitCode, CommandError> {
         let rules = self.rules.rules()?;
         let mut tournament = self.tournament(&rules)?;
+        // Before the games, so that none is played for a file that cannot be written.
+        let csv = (self.csv.as_deref()).map(AtomicFile::create).transpose()?;
         let games = tournament.games_expected() as u64;
         let pool = threads::pool(self.threads, games)?;
         let bar = progress::of_items(games, "games");
@@ -97,9 +100,7 @@ impl Simulate {
             start.elapsed().as_secs_f64()
         );
         let results = self.results(&tournament);
-        if let Some(file) = &self.csv {
-            files::write_standings(file, &results)?;
-        }
+        let written = csv.map(|file| files::write_standings(file, &results));
         let mut out = anstream::stdout().lock();
         if self.json {
             writeln!(out, "{}", self.json(&rules, &tournament, &results))?;
@@ -107,6 +108,7 @@ impl Simulate {
             write!(out, "{}", self.text(&rules, &tournament, &results))?;
         }
         out.flush()?;
+        written.transpose()?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, typed};
+use super::run::{Ended, typed, typed_on_a_full_disk};
 
 fn simulate(flags: &str) -> Ended {
     typed(&format!("simulate {flags}"))
@@ -146,6 +146,20 @@ fn mistakes_are_explained() {
     for (flags, expected) in table {
         simulate(flags).assert_refused(expected);
     }
+}
+
+#[test]
+fn records_that_cannot_be_written_cost_no_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    let refused = simulate(&format!("--records {}", file.join("records").display()));
+    refused.assert_failed("--records: ");
+    let records = folder.path().join("records");
+    let flags = "--games 2 --records";
+    let ended = typed_on_a_full_disk(&format!("simulate {flags} {}", records.display()));
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert_eq!(ended.stdout, simulate("--games 2").stdout);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, typed};
+use super::run::{Ended, typed, typed_on_a_full_disk};
 
 fn simulate(flags: &str) -> Ended {
     typed(&format!("tournament simulate {flags}"))
@@ -119,6 +119,22 @@ fn standings_are_written_as_csv() {
     let csv = std::fs::read_to_string(&file).unwrap();
     assert_eq!(csv.lines().count(), 6);
     assert!(csv.starts_with("place,participant,name,"), "{csv}");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_costs_no_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let flags = "--format round_robin --agents greedy*4 --csv";
+    let simulate_to = |file: &str| {
+        let file = folder.path().join(file);
+        format!("tournament simulate {flags} {}", file.display())
+    };
+    let refused = typed(&simulate_to("nowhere/standings.csv"));
+    refused.assert_failed("nowhere");
+    assert!(!refused.stderr.contains("games in"), "{refused:?}");
+    let ended = typed_on_a_full_disk(&simulate_to("standings.csv"));
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    ended.assert_says(&["round robin of 4 participants"]);
 }
 
 #[test]
