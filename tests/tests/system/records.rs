@@ -227,6 +227,11 @@ async fn a_file_that_is_damaged_or_refused_ends_no_import_of_the_others() {
     std::fs::write(&damaged, "{\n").expect("written");
     let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/records");
     let [fixed, committed] = ["fixed.jsonl", "committed.jsonl"].map(|it| fixtures.join(it));
+    let refused = folder.path().join("refused.jsonl");
+    let text = std::fs::read_to_string(&committed).expect("the record");
+    let (header, rest) = text.split_once('\n').expect("a header");
+    let without_an_event = rest.split_once('\n').expect("an event").1;
+    std::fs::write(&refused, format!("{header}\n{without_an_event}")).expect("written");
     let import = async |files: &[&std::path::Path]| {
         let mut command = tokio::process::Command::new(set_up("CHEFSHAT_BIN"));
         command.args(["records", "import", "--server", &server.url()]);
@@ -235,10 +240,11 @@ async fn a_file_that_is_damaged_or_refused_ends_no_import_of_the_others() {
     };
     let first = import(&[&fixed]).await;
     assert!(first.status.success(), "{first:?}");
-    let output = import(&[&damaged, &fixed, &committed]).await;
+    let output = import(&[&damaged, &refused, &fixed, &committed]).await;
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(said.matches("not imported: ").count(), 2, "{said}");
+    assert_eq!(said.matches("already there: ").count(), 1, "{said}");
     assert_eq!(listed(&mut service(&server).await, false).await.len(), 2);
     server.stop().await;
 }

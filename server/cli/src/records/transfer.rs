@@ -12,7 +12,8 @@ use chefshat_record::jsonl;
 use clap::Args;
 use indicatif::ProgressBar;
 use prost::Message as _;
-use tonic::Code;
+use tonic::{Code, Response, Status};
+use tonic_types::StatusExt as _;
 
 use super::super::connect::{SecretArgs, ServerArg};
 use super::super::error::is_broken_pipe;
@@ -25,6 +26,8 @@ use super::list::in_a_line;
 const MAX_RESPONSE_BYTES: usize = 16 * 1024 * 1024;
 /// Bytes of lines per message: half of the server's limit.
 const PART_BYTES: usize = 32 * 1024;
+/// Maximum number of times that a record is sent.
+const MAX_ATTEMPTS: u32 = 60;
 
 /// Download the record of one game.
 #[derive(Debug, Args)]
@@ -75,7 +78,8 @@ pub(super) struct Stream {
 }
 
 /// Import records of games played elsewhere: on another server or at a physical table. The server
-/// verifies them first and must have been started with --allow-import.
+/// verifies them first and must have been started with --allow-import. Games that it already has are
+/// skipped, so an import that broke off can be repeated.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  chefshat records import ./game.jsonl ./games/*.jsonl")]
 pub(super) struct Import {
@@ -202,7 +206,7 @@ impl Stream {
 impl Import {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect().await?;
-        let mut service = service(&client);
+        let service = service(&client);
         let bar = progress::of_items(self.files.len() as u64, "records");
         let mut failed = 0;
         let mut not_imported = |problem: &dyn std::fmt::Display| {
@@ -219,11 +223,22 @@ impl Import {
                     continue;
                 }
             };
-            let requests = tokio_stream::iter(in_parts(lines));
-            let added = match service.import_record(requests).await {
+            let parts = in_parts(lines);
+            let send = || {
+                let (mut service, parts) = (service.clone(), tokio_stream::iter(parts.clone()));
+                async move { service.import_record(parts).await }
+            };
+            let added = match when_allowed(send).await {
                 Ok(added) => added,
                 Err(status) => {
                     let error = Error::from(status);
+                    // As when an import that broke off is begun again.
+                    if error.reason() == Some("GAME_KNOWN") {
+                        let file = file.display();
+                        bar.suspend(|| anstream::eprintln!("already there: {file}"));
+                        bar.inc(1);
+                        continue;
+                    }
                     let refused = refused(file, &error);
                     if !is_about_record(&error) {
                         return Err(refused);
@@ -247,6 +262,27 @@ impl Import {
             0 => ExitCode::SUCCESS,
             _ => ExitCode::FAILURE,
         })
+    }
+}
+
+/// Sends a request, and again when the server says that it may be: a server limits what it stores for
+/// a caller in a second.
+async fn when_allowed<T, F>(send: impl Fn() -> F) -> Result<Response<T>, Status>
+where
+    F: Future<Output = Result<Response<T>, Status>>,
+{
+    let mut attempt = 1;
+    loop {
+        let status = match send().await {
+            Ok(response) => return Ok(response),
+            Err(status) => status,
+        };
+        let retry = status.get_details_retry_info();
+        match retry.and_then(|retry| retry.retry_delay) {
+            Some(delay) if attempt < MAX_ATTEMPTS => tokio::time::sleep(delay).await,
+            _ => return Err(status),
+        }
+        attempt += 1;
     }
 }
 
@@ -303,7 +339,39 @@ fn print(lines: &[RecordLine]) -> Result<(), CommandError> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+    use std::time::Duration;
+
+    use tonic_types::ErrorDetails;
+
     use crate::records::transfer::*;
+
+    /// A server that refuses a request this many times, and names a time to try again.
+    async fn sent_to_a_busy_server(refusals: u32) -> Result<u32, Status> {
+        let sent = Cell::new(0);
+        let response = when_allowed(|| {
+            sent.set(sent.get() + 1);
+            std::future::ready(match sent.get() {
+                number if number > refusals => Ok(Response::new(number)),
+                _ => {
+                    let details = ErrorDetails::with_retry_info(Some(Duration::from_millis(1)));
+                    let code = Code::ResourceExhausted;
+                    Err(Status::with_error_details(code, "too many bytes", details))
+                }
+            })
+        });
+        response.await.map(Response::into_inner)
+    }
+
+    #[tokio::test]
+    async fn a_record_is_sent_again_when_the_server_says_that_it_may_be() {
+        let sent = sent_to_a_busy_server(3).await;
+        assert_eq!(sent.expect("the fourth one"), 4);
+        let refused = sent_to_a_busy_server(MAX_ATTEMPTS).await;
+        refused.expect_err("given up");
+        let full = || std::future::ready(Err::<Response<()>, _>(Status::data_loss("full")));
+        when_allowed(full).await.expect_err("no time to try again");
+    }
 
     #[test]
     fn a_record_is_sent_whole_and_in_parts_that_fit() {

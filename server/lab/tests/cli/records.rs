@@ -48,6 +48,21 @@ fn a_download_is_resumed_after_the_last_record_that_arrived() {
 }
 
 #[test]
+fn an_import_that_broke_off_can_be_repeated() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_server, url) = serve_with(folder.path(), &["--allow-import"]);
+    let [first, second] = ["committed", "fixed"].map(|name| {
+        let file = fixture(&format!("records/{name}.jsonl"));
+        file.to_str().unwrap().to_owned()
+    });
+    run(&url, &format!("records import {first}")).clean();
+    let again = run(&url, &format!("records import {first} {second}")).well();
+    assert_eq!(again.stderr, format!("already there: {first}\n"));
+    assert_eq!(again.stdout.lines().count(), 1, "{again:?}");
+    assert_eq!(listed(&url).len(), 2);
+}
+
+#[test]
 fn a_download_into_a_closed_pipe_ends_well() {
     let folder = tempfile::tempdir().unwrap();
     let (_server, url) = serve_with(folder.path(), &["--allow-import"]);
