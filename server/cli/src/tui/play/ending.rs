@@ -35,7 +35,7 @@ pub(super) fn print_end(part: &Part, hints: &Hints) -> Result<ExitCode, CommandE
     if let Some(lobby) = &part.lobby {
         return of_tournament(part, lobby, hints);
     }
-    let lost = match &part.link {
+    let link_lost = match &part.link {
         Link::Over(why) => why.clone(),
         _ => None,
     };
@@ -53,8 +53,8 @@ pub(super) fn print_end(part: &Part, hints: &Hints) -> Result<ExitCode, CommandE
             Ok(ExitCode::FAILURE)
         }
         (_, _) => {
-            if let Some(why) = lost {
-                return Err(format!("the seat is lost: {why}").into());
+            if let Some(why) = link_lost {
+                return Err(lost("seat", &why, hints));
             }
             say("you left the table before the game ended")?;
             back(hints)?;
@@ -100,7 +100,7 @@ fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, 
             ExitCode::FAILURE
         }
         (_, Link::Over(Some(why))) => {
-            return Err(format!("the place in the tournament is lost: {why}").into());
+            return Err(lost("place in the tournament", why, hints));
         }
         (_, Link::Over(None)) => {
             say(standing(lobby, "the tournament is over"))?;
@@ -133,6 +133,14 @@ fn standing(lobby: &Lobby, what: &str) -> String {
     }
 }
 
+/// The seat or place is lost. It can be resumed if only the connection was lost for too long.
+fn lost(what: &str, why: &str, hints: &Hints) -> CommandError {
+    match &hints.back {
+        Some(back) => format!("the {what} is lost: {why}\nto resume: {back}").into(),
+        None => format!("the {what} is lost: {why}").into(),
+    }
+}
+
 fn back(hints: &Hints) -> Result<(), CommandError> {
     match &hints.back {
         Some(back) => say(format_args!("to resume: {back}")),
@@ -144,6 +152,31 @@ fn back(hints: &Hints) -> Result<(), CommandError> {
 mod tests {
     use crate::tui::play::ending::*;
     use crate::tui::play::lobby::Report;
+    use crate::tui::play::part::PartInput;
+    use crate::tui::play::tournament_session::TournamentSession;
+
+    #[test]
+    fn a_person_who_lost_the_connection_learns_how_to_resume() {
+        let hints = Hints {
+            record: Box::new(str::to_owned),
+            page: None,
+            results: String::new(),
+            back: Some("chefshat play --ticket T".into()),
+        };
+        let outage = || PartInput::Over(Some("no connection for 600 s".into()));
+        let mut seat = Part::new(None);
+        seat.take(outage(), 0);
+        let mut tournament = TournamentSession::new();
+        tournament.handle(outage());
+        for (part, what) in [
+            (&seat, "seat"),
+            (&tournament.part, "place in the tournament"),
+        ] {
+            let error = print_end(part, &hints).expect_err("it is lost");
+            let words = "no connection for 600 s\nto resume: chefshat play --ticket T";
+            assert_eq!(error.to_string(), format!("the {what} is lost: {words}"));
+        }
+    }
 
     /// A closed tournament reports no place before a game has counted.
     #[test]

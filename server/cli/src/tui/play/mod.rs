@@ -55,7 +55,7 @@ const MAX_PACE_MS: i64 = 60_000;
                   chefshat play --local --agents trained,trained,trained --target-shifts 3\n\n\
                   The code of a tournament works, too: your games start by themselves, with the standings between them, until the \
                   tournament is over.\n\n\
-                  Press ? for the keys. If you leave, a ticket is printed; resume with --ticket.\n\n\
+                  Press ? for the keys. If you leave or the connection is lost, a ticket is printed; resume with --ticket.\n\n\
                   Exit code: 0 when the game or tournament finished, 1 when it was aborted, closed, left or lost, 2 without a terminal.")]
 pub(crate) struct Play {
     #[command(flatten)]
