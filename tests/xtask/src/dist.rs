@@ -74,7 +74,16 @@ pub(crate) fn run(
 ) -> Result<(), Failure> {
     let dist = places.dist();
     let stage = places.own.join("dist");
-    steps.run("check that all is committed", || committed(places))?;
+    let mut commit = String::new();
+    steps.run("check that all is committed", || {
+        commit = committed(places)?;
+        Ok(())
+    })?;
+    if let Some(key) = key {
+        steps.run("check that the key is there", || {
+            fs::metadata(key).map(drop).map_err(|error| at(key, &error))
+        })?;
+    }
     steps.run("empty the folder", || {
         [&dist, &stage]
             .into_iter()
@@ -94,7 +103,8 @@ pub(crate) fn run(
         places,
         dist: &dist,
         stage: &stage,
-        date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
+        date: read(git(places).args(["log", "-1", "--format=%ct", &commit]))?,
+        commit,
         host: Platform::host()?,
     };
     for platform in &PLATFORMS {
@@ -119,6 +129,9 @@ pub(crate) fn run(
         Ok(()) => steps.run("image", || release.image())?,
         Err(failure) => steps.skip("image", &failure.to_string()),
     }
+    steps.run("check that nothing has changed meanwhile", || {
+        unchanged(places, &release.commit)
+    })?;
     steps.run("checksums", || release.sign(key))?;
     if try_them {
         steps.run("set up Python", || setup::python_packages(places))?;
@@ -144,6 +157,8 @@ struct Release<'a> {
     dist: &'a Path,
     /// Where it is prepared.
     stage: &'a Path,
+    /// The commit that it is made from.
+    commit: String,
     /// The time of the commit, seconds since 1970: that of all files in archives.
     date: String,
     /// The platform of this machine.
@@ -316,7 +331,7 @@ impl Release<'_> {
         archive.args(["archive", "--format=tar.gz"]);
         archive.arg(format!("--prefix={name}/"));
         archive.arg(format!("--output={}/{name}.tar.gz", self.dist.display()));
-        run_command(archive.arg("HEAD"))?;
+        run_command(archive.arg(&self.commit))?;
         // What describes the contents writes beside the manifests.
         run_command(
             Command::new("tar")
@@ -467,15 +482,25 @@ impl Release<'_> {
     }
 }
 
-/// A release is what a commit contains.
-fn committed(places: &Places) -> Result<(), Failure> {
+/// The commit that is checked out, if the source tree is what it contains.
+fn committed(places: &Places) -> Result<String, Failure> {
     let mut status = git(places);
     status.args(["status", "--porcelain", "--untracked-files=normal"]);
     match read(&mut status)?.is_empty() {
-        true => Ok(()),
+        true => read(git(places).args(["rev-parse", "HEAD"])),
         false => Err(Failure::new(
             "commit your changes: a release is made from a commit",
         )),
+    }
+}
+
+/// Checks that the source tree still is what a commit contains: the steps read it one after the other.
+fn unchanged(places: &Places, commit: &str) -> Result<(), Failure> {
+    match committed(places)? == commit {
+        true => Ok(()),
+        false => Err(Failure::new(format!(
+            "another commit was checked out meanwhile; check {commit} out and begin again"
+        ))),
     }
 }
 
@@ -517,6 +542,35 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
+}
+
+#[test]
+fn a_release_is_made_from_one_commit() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path().to_path_buf();
+    let places = Places {
+        target: root.join("target"),
+        own: root.join("target/xtask"),
+        root,
+    };
+    let commit = || {
+        let author = ["-c", "user.name=x", "-c", "user.email=x@example.org"];
+        let mut commit = git(&places);
+        commit.args(author);
+        commit.args(["commit", "--quiet", "--allow-empty", "--message=x"]);
+        run_command(&mut commit).unwrap();
+        committed(&places).unwrap()
+    };
+    run_command(git(&places).args(["init", "--quiet"])).unwrap();
+    let first = commit();
+    unchanged(&places, &first).unwrap();
+    let file = places.root.join("file");
+    fs::write(&file, "").unwrap();
+    unchanged(&places, &first).unwrap_err();
+    fs::remove_file(&file).unwrap();
+    unchanged(&places, &first).unwrap();
+    assert_ne!(commit(), first);
+    unchanged(&places, &first).unwrap_err();
 }
 
 /// All packages have one version, and name each other with it.
