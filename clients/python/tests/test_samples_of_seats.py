@@ -49,6 +49,33 @@ def test_samples_are_sent_with_times_of_the_room(fake: FakeServer) -> None:
         assert fake.samples[1].elapsed_us[0] == times[-1] + 1, "times ascend, and the end of the stream sends what waits"
 
 
+@pytest.mark.parametrize(
+    ("values", "at", "error"),
+    [
+        ([None, 0.0], None, TypeError),
+        ([0.0, math.inf], None, ValueError),
+        ([-1e300, 0.0], None, ValueError),  # Infinite as a 32-bit number.
+        ([0.0, 0.0], 102.0, ValueError),
+        ([0.0, 0.0], math.nan, ValueError),
+    ],
+)
+def test_a_wrong_sample_does_not_harm_the_others(
+    fake: FakeServer, values: list[float], at: float | None, error: type[Exception]
+) -> None:
+    channels = ["valence", "arousal"]
+    with chefshat.Client(fake.address) as client:
+        room_id, ticket = seated(client)
+        with SampleStream(client, ticket, room_id, "affect", channels, local=lambda: 100.0, interval_s=NEVER_S) as stream:
+            stream.push([0.25, math.nan])
+            with pytest.raises(error):
+                stream.push(values, at)
+            stream.push([0.5, 0.75], at=100.9)
+        (chunk,) = fake.samples
+        first, second = chunk.elapsed_us
+        assert second - first == pytest.approx(900_000, abs=1)
+        assert list(chunk.values) == [0.25, pytest.approx(math.nan, nan_ok=True), 0.5, 0.75]
+
+
 def test_samples_are_sent_in_a_thread(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
         room_id, ticket = seated(client)
@@ -91,7 +118,7 @@ def test_a_refusal_in_the_thread_is_raised_by_a_push(fake: FakeServer) -> None:
 
 
 def test_an_outage_loses_no_sample_and_moves_none() -> None:
-    begun = time.monotonic()
+    begun = time.monotonic() - 12
     taken = [begun + number / 100 for number in range(1_200)]
     # Nobody else listens there, also while this server is away.
     host, port = f"127.195.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}", 25_051

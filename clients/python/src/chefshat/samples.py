@@ -1,6 +1,8 @@
 """Streams of samples of a seat, such as thirty a second of affect: `SampleStream`."""
 
+import math
 import threading
+from array import array
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
@@ -14,6 +16,8 @@ from chefshat.errors import ChefsHatError
 MAX_SAMPLES = 512
 # Most samples that wait while the server cannot be reached: nine hours of thirty a second.
 MAX_WAITING = 1_000_000
+# How far in the future a sample may be, in microseconds: clocks are not known exactly. The server allows the same.
+MAX_AHEAD_US = 1_000_000
 # Seconds between two chunks.
 INTERVAL_S = 1.0
 
@@ -76,22 +80,29 @@ class SampleStream:
         """Adds a sample. Never waits for the server.
 
         Args:
-            values: one for each channel; NaN where there is none.
+            values: one for each channel, finite as 32-bit numbers; NaN where there is none.
             at: when it was taken, on the local clock; None: now.
 
         Raises:
+            ValueError: the values do not match the channels or are infinite, or the time is in the future. The sample is not added.
             ChefsHatError: the server has refused earlier samples, or was away for so long that no more can wait (SAMPLES_WAITING).
         """
         if len(values) != len(self._waiting.channels):
             raise ValueError(f"{len(values)} values for {len(self._waiting.channels)} channels")
+        # The server refuses a whole chunk with a wrong sample, and so all samples after it: it must not get into one.
+        sample = array("f", values)
+        if any(map(math.isinf, sample)):
+            raise ValueError(f"{values} must be finite as 32-bit numbers, or NaN where there is none")
         moment = self.clock.elapsed_us(at)
+        if at is not None and moment > self.clock.elapsed_us() + MAX_AHEAD_US:
+            raise ValueError(f"{at} is in the future of the local clock")
         with self._lock:
             if len(self._waiting.elapsed_us) >= MAX_WAITING:
                 raise ChefsHatError("SAMPLES_WAITING", f"{MAX_WAITING} samples wait for a server that does not answer")
             # Times ascend, also if the clock was read anew meanwhile.
             self._last_us = max(moment, self._last_us + 1, 0)
             self._waiting.elapsed_us.append(self._last_us)
-            self._waiting.values.extend(values)
+            self._waiting.values.extend(sample)
             refusal, self._refusal = self._refusal, None
         if refusal is not None:
             raise refusal
