@@ -18,6 +18,11 @@ from chefshat_robot.words import Words
 from tests.loop import run, until
 from tests.robots import HAND, ScriptedRobot, game_started, numbered, passed, pizza_done, play, shift_started
 
+# The action of two 9s.
+TWO_NINES = 3 * (36 + 1)
+# `HAND` in an observation.
+HAND_COUNTS = bytes([0, 2, 0, 0, 1, 0, 1, 0, 3, 3, 5, 2])
+
 
 def said(robot: ScriptedRobot) -> list[str]:
     return [act.text for act in robot.acts if isinstance(act, Say)]
@@ -335,14 +340,15 @@ def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_r
 class Waits(chefshat.Agent):
     """An agent that computes until somebody lets it, and notes what it hears."""
 
-    def __init__(self) -> None:
+    def __init__(self, action: int = 199) -> None:
+        self.action = action
         self.may_end = threading.Event()
         self.heard: list[str] = []
 
     def decide(self, request: Decision) -> int:
         assert self.may_end.wait(60)
         self.heard.append("decision")
-        return 199
+        return self.action
 
     def on_event(self, event: pb.GameEvent) -> None:
         self.heard.append(f"event {event.sequence}")
@@ -370,6 +376,50 @@ def test_an_agent_that_computes_stops_nobody_hears_everything_in_order_and_its_e
             player.on_event(pb.GameEvent(sequence=9))
             with pytest.raises(ValueError, match="a ninth event"):
                 await player.decide(request([0, 199]))
+
+    run(test())
+
+
+def test_an_answer_to_a_decision_that_has_closed_is_not_performed() -> None:
+    async def test() -> None:
+        robot, notices, agent = ScriptedRobot(), list[Notice](), Waits(TWO_NINES)
+        body = await table(robot, notices)
+        player = RobotPlayer(agent, body)
+        player.on_attached(SeatInfo("room", "game", 1))
+        deciding = [asyncio.create_task(player.decide(request([TWO_NINES, 199]))) for _ in range(2)]
+        await asyncio.sleep(0)
+        # The time of both decisions runs out.
+        for event in list(numbered({}, {}, passed(1), pizza_done(0, 1)))[2:]:
+            player.on_event(event)
+        state = body.state
+        agent.may_end.set()
+        assert await asyncio.gather(*deciding) == [TWO_NINES, TWO_NINES]
+        await body.idle()
+        assert body.state == state
+        assert said(robot) == ["I pass."]
+        assert [move.piece for move in carried(robot)] == ["pass", "pass"]
+        assert notices == []
+        await body.__aexit__(None, None, None)
+
+    run(test())
+
+
+def test_of_two_open_decisions_only_the_newer_is_performed() -> None:
+    async def test() -> None:
+        robot, notices, agent = ScriptedRobot(), list[Notice](), Waits(TWO_NINES)
+        body = await table(robot, notices)
+        player = RobotPlayer(agent, body)
+        player.on_attached(SeatInfo("room", "game", 1))
+        deciding = [asyncio.create_task(player.decide(request([TWO_NINES, 199], hand=HAND_COUNTS))) for _ in range(2)]
+        await asyncio.sleep(0)
+        # An event of the room closes no decision.
+        player.on_event(pb.GameEvent(sequence=3, expression_shown=pb.ExpressionShown(seat=2)))
+        agent.may_end.set()
+        await asyncio.gather(*deciding)
+        await body.idle()
+        assert said(robot) == ["I play two 9s."]
+        assert [move.piece for move in carried(robot)] == ["9", "9"]
+        await body.__aexit__(None, None, None)
 
     run(test())
 
@@ -428,8 +478,8 @@ def test_a_decision_says_which_cards_the_robot_has_when_events_did_not() -> None
             for event in numbered(game_started(), {"shift_started": pb.ShiftStarted(shift=1)}):
                 body.on_event(event)
             hand = bytes([0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 1, 1])
-            player = RobotPlayer(Takes(3 * (36 + 1)), body)  # Two 9s.
-            await player.decide(request([3 * (36 + 1)], hand=hand, golden=True, cards_left=bytes([5, 5, 5, 5])))
+            player = RobotPlayer(Takes(TWO_NINES), body)
+            await player.decide(request([TWO_NINES], hand=hand, golden=True, cards_left=bytes([5, 5, 5, 5])))
             # In the stand lie a 5, two 9s, the Golden card and a joker, in this order.
             assert [(move.piece, move.start.y if move.start else None) for move in carried(robot)] == [("9", 25.0), ("9", 50.0)]
 

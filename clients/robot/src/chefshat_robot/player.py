@@ -3,7 +3,7 @@
 What the robot does is in `body`. A decision is answered when the robot has finished its turn, or when the time of the decision is
 nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision. At a physical table
 it is answered at once, and then laid. An agent that computes for a while stops neither the body nor the connection: it has a
-thread of its own.
+thread of its own. If its time runs out meanwhile, the default decision is performed, and not what the agent answers later.
 """
 
 from __future__ import annotations
@@ -25,6 +25,23 @@ from chefshat_robot.drivers.driver import RobotEvent
 # The part of a decision's time that is left for the answer to travel, and the least of it, in seconds.
 MARGIN = 0.15
 MIN_MARGIN_S = 1.0
+# Events of the game, which waits while a decision is open: each says that the decision has closed. Events of the room do not.
+GAME_EVENTS = frozenset(
+    (
+        "shift_started",
+        "roles_assigned",
+        "special_action_declared",
+        "cards_exchanged",
+        "play",
+        "pass",
+        "pizza_done",
+        "seat_finished",
+        "shift_ended",
+        "game_ended",
+        "game_aborted",
+        "correction",
+    )
+)
 
 
 class RobotPlayer(chefshat.Agent):
@@ -54,14 +71,20 @@ class RobotPlayer(chefshat.Agent):
         self._on_robot_event = on_robot_event
         self._says_violations = says_violations
         self._listener: asyncio.Task[None] | None = None
+        # The last decision; None once it has closed.
+        self._open: Decision | None = None
         # The gift decided last at a physical table: number of the decision, face and receiver.
         self._gift: tuple[int, int, int] | None = None
 
     async def decide(self, request: Decision) -> int | None:
-        """Lets the agent decide, and the robot act. Illegal actions of the agent are answered at once, without an act."""
+        """Lets the agent decide, and the robot act.
+
+        Illegal actions of the agent are answered at once, without an act, and so are decisions that have closed meanwhile.
+        """
         asked = time.monotonic()
+        self._open = request
         action = await self._agent.decide(request)
-        if action is not None and action in request.legal_actions:
+        if self._open is request and action is not None and action in request.legal_actions:
             self._body.observe(request.request.observation)
             await self._act(request, action, asked)
         return action
@@ -96,6 +119,8 @@ class RobotPlayer(chefshat.Agent):
 
     def on_event(self, event: pb.GameEvent) -> None:
         """Lets the agent and the robot follow the game."""
+        if event.WhichOneof("kind") in GAME_EVENTS:
+            self._open = None
         self._agent.tell(lambda agent: agent.on_event(event))
         self._body.on_event(event)
         if self._says_violations and event.HasField("violation") and event.sequence >= self._body.live_from:
