@@ -168,6 +168,79 @@ def test_events_of_the_past_are_followed_without_acts() -> None:
     run(test())
 
 
+Step = pb.GameEvent | tuple[pb.Observation, Turn | int]
+
+
+def own_shift() -> list[Step]:
+    """A Shift of seat 1 as Chef: events, and decisions, with what the seat sees and its turn or the face of its gift."""
+
+    def seen(*cards: int, gave: bytes = b"") -> pb.Observation:
+        hand = bytes(cards.count(face) for face in range(1, 13))
+        return pb.Observation(shift=1, hand=hand, golden=True, cards_left=bytes(4), passed=bytes(4), gave=gave)
+
+    jokers_and_11s = [11, 11, 11, 11, 11, 12, 12]
+    received, gifts = pb.CardsExchanged(giver=3, receiver=1, cards=[1, 3]), pb.CardsExchanged(giver=1, receiver=3, cards=[2, 9])
+    after_two_turns = seen(1, 2, 3, 5, 7, 9, 10, 10, 10, *jokers_and_11s)
+    steps: list[dict[str, object] | tuple[pb.Observation, Turn | int]] = [
+        game_started(),
+        shift_started(),
+        (seen(*HAND), 9),
+        (seen(2, 2, 5, 7, 9, 9, 10, 10, 10, *jokers_and_11s, gave=bytes([0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0])), 2),
+        {"cards_exchanged": received},
+        {"cards_exchanged": gifts},
+        (seen(1, 2, 3, 5, 7, 9, 9, 10, 10, 10, *jokers_and_11s), Turn(9, 1)),
+        play(1, 9, 1, cards_left=16),
+        passed(2),
+        play(3, 8, 1),
+        passed(0),
+        (after_two_turns, PASS),
+        passed(1),
+        pizza_done(3, 1),
+        (after_two_turns, Turn(9, 1)),
+        play(1, 9, 1, cards_left=15),
+        (seen(1, 2, 3, 5, 7, 10, 10, 10, *jokers_and_11s), Turn(1, 1, 1)),
+        play(1, 1, 1, 1, cards_left=13),
+    ]
+    events = numbered(*(step for step in steps if isinstance(step, dict)))
+    return [next(events) if isinstance(step, dict) else step for step in steps]
+
+
+async def carries_from(first: int) -> list[list[CardMove]]:
+    """What a robot carries at each step of `own_shift`, if those before `first` are of the past."""
+    robot, steps, moves = ScriptedRobot(), own_shift(), list[list[CardMove]]()
+    past = sum(isinstance(step, pb.GameEvent) for step in steps[:first])
+    async with Body(robot, Words("en")) as body:
+        body.seat_at(1, live_from=past + 1)
+        for number, step in enumerate(steps):
+            if isinstance(step, pb.GameEvent):
+                body.on_event(step)
+            elif number >= first:
+                observation, decided = step
+                body.observe(observation)
+                if isinstance(decided, Turn):
+                    body.take_turn(decided)
+                else:
+                    body.give(decided, 3)
+            await body.idle()
+            moves.append(carried(robot))
+            robot.acts.clear()
+        assert body.state.hand == (0, 1, 1, 0, 1, 0, 1, 0, 0, 3, 5, 1)
+    return moves
+
+
+def test_a_resumed_robot_knows_where_its_cards_are() -> None:
+    uninterrupted = run(carries_from(0))
+    taken = [move for moves in uninterrupted for move in moves if move.piece != "pass"]
+    # The gifts leave slots 4 and 0, into which the 1 and the 3 are put.
+    slots = [(move.piece, move.start.y / 25) for move in taken if move.start]
+    assert slots == [("9", 4), ("2", 0), ("9", 5), ("9", 6), ("1", 0), ("joker", 15)]
+    # Between a decision and its events it is not known whether the cards have been carried: they are carried again.
+    between = (4, 5, 7, 12, 15, 17)
+    for first in range(len(uninterrupted)):
+        if first not in between:
+            assert run(carries_from(first))[first:] == uninterrupted[first:], first
+
+
 def test_turns_that_a_correction_repeats_are_not_performed_again() -> None:
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()

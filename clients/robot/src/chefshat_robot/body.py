@@ -185,6 +185,10 @@ class Body:
         self._repeated: list[Turn] = []
         # Pieces that were given in the exchange, which is not complete yet.
         self._given: list[str] = []
+        # Whether the own gifts of the Shift have been handed over.
+        self._has_given = False
+        # Whether the Shift began before the robot was there.
+        self._joined_in_shift = False
         self._needed: deque[_Job] = deque()
         self._reactions: deque[_Job] = deque(maxlen=MAX_REACTIONS)
         self._forwards: deque[tuple[pb.GameEvent, TableState]] = deque(maxlen=MAX_FORWARDS)
@@ -225,9 +229,12 @@ class Body:
 
     def observe(self, seen: pb.Observation) -> None:
         """Corrects what the robot knows, by the observation of one of its decisions."""
+        if self._joined_in_shift and not self._given and not seen.received:
+            # Like its turns of the past, the gifts that its seat has already chosen have been carried.
+            self._given = layout.pieces_of(seen.gave, self.state.golden and not seen.golden)
         self.state = observe(self.state, seen)
         if self._stand is not None:
-            self._stand.settle(self.state.hand, self.state.golden)
+            self._stand.settle(tuple(seen.hand), seen.golden)
 
     def take_turn(self, turn: Turn) -> asyncio.Event:
         """Starts to perform an own turn. Returns an event that is set when its acts have ended."""
@@ -268,9 +275,9 @@ class Body:
         self._forwards.append((event, after))
         self._all_forwarded.clear()
         self._forward_work.set()
+        self._follow_turns(event, before, after, live)
         if not live:
             return
-        self._follow_turns(event, before, after)
         if self._small_talk:
             self._react(event, after)
         if after.to_act is not None and after.to_act != before.to_act and after.to_act != after.seat:
@@ -311,12 +318,16 @@ class Body:
             self._pass_is_down = False
             self._announced = None
             self._given.clear()
+            self._has_given = False
+            self._joined_in_shift = not live
         elif kind == "hand_reported":
             stand.settle(after.hand, after.golden)
         elif kind == "cards_exchanged" and event.cards_exchanged.giver == own:
             self._exchanged(event.cards_exchanged, after, stand, live)
         elif kind == "cards_exchanged" and event.cards_exchanged.receiver == own and after.hand:
-            stand.settle(after.hand, after.golden)
+            # A seat that chooses its gifts receives the others' first. But its own have left the rack before those are put in.
+            if self._has_given:
+                stand.settle(after.hand, after.golden)
         elif kind == "pizza_done":
             self._take_pass_back(after, live)
 
@@ -343,27 +354,31 @@ class Body:
             else:
                 wrong.append(piece)
         self._given.clear()
+        self._has_given = True
         if live and wrong:
             text = self.words.say("please_take_back", cards=self.words.some_cards(len(wrong)))
             self.say(text)
             self._notify(Notice("help", text, "the decision was too late, and the default decision counted"))
-        if live and pieces:
-            self._need(self._gift_job(pieces, given.receiver, stand))
+        if pieces:
+            job = self._gift_job(pieces, given.receiver, stand)
+            if live:
+                self._need(job)
         stand.settle(after.hand, after.golden)
 
     def _gift_job(self, pieces: Sequence[str], receiver: int, stand: Stand) -> _Job:
-        """Returns how gifts are carried to their receiver."""
+        """Returns how gifts are carried to their receiver, and takes them out of the rack."""
         state, words = self.state, self.words
         moves = stand.take(pieces, [layout.gift_place(receiver, state.players)] * len(pieces))
         name, count = state.name(receiver), words.some_cards(len(moves))
         spoken = Say(words.say("give", count=count, name=name), words.language)
         return _Job((spoken, Pick(moves)), words.say("please_give", count=count, name=name))
 
-    def _need_turn(self, turn: Turn, state: TableState) -> asyncio.Event:
-        """Queues what the robot does for a turn in a state."""
+    def _need_turn(self, turn: Turn, state: TableState, live: bool = True) -> asyncio.Event:
+        """Queues what the robot does for a turn in a state. A turn of the past only changes where its cards are."""
         if not turn.is_pass:
-            self._take_pass_back(state)
-        return self._need(self._turn_job(turn, state))
+            self._take_pass_back(state, live)
+        job = self._turn_job(turn, state)
+        return self._need(job) if live else job.done
 
     def _turn_job(self, turn: Turn, state: TableState) -> _Job:
         """Returns what the robot does for a turn in a state, and takes the cards out of its stand."""
@@ -399,7 +414,7 @@ class Body:
         stand = self._stand if self._stand is not None else Stand.at(own, state.players)
         return stand.take(pieces, layout.play_places(len(pieces)))
 
-    def _own_turn(self, sequence: int, turn: Turn, before: TableState, after: TableState) -> None:
+    def _own_turn(self, sequence: int, turn: Turn, before: TableState, after: TableState, live: bool) -> None:
         """Confirms the announced turn, or performs the one that counted instead."""
         self._turns.append((sequence, turn))
         if self._repeated:
@@ -415,21 +430,21 @@ class Body:
             text = self.words.say("please_take_back", cards=cards)
             self.say(text)
             self._notify(Notice("help", text, "the decision was too late, and the default decision counted"))
-        self._need_turn(turn, before)
+        self._need_turn(turn, before, live)
         if self._stand is not None and after.hand:
             self._stand.settle(after.hand, after.golden)
 
-    def _follow_turns(self, event: pb.GameEvent, before: TableState, after: TableState) -> None:
-        """Performs what the own seat did."""
+    def _follow_turns(self, event: pb.GameEvent, before: TableState, after: TableState, live: bool) -> None:
+        """Performs what the own seat did, unless it is of the past."""
         own = after.seat
         match event.WhichOneof("kind"):
             case "play" if event.play.seat == own:
                 play = event.play
                 turn = Turn(play.face if play.quantity else 0, play.quantity, play.jokers)
-                self._own_turn(event.sequence, turn, before, after)
+                self._own_turn(event.sequence, turn, before, after, live)
             case "pass" if getattr(event, "pass").seat == own:
-                self._own_turn(event.sequence, PASS, before, after)
-            case "special_action_declared" if event.special_action_declared.seat == own and self._announces:
+                self._own_turn(event.sequence, PASS, before, after, live)
+            case "special_action_declared" if event.special_action_declared.seat == own and live and self._announces:
                 food_fight = event.special_action_declared.action == pb.SPECIAL_ACTION_FOOD_FIGHT
                 self.say(self.words.say("food_fight" if food_fight else "dinner"))
 

@@ -6,6 +6,7 @@ The printed places are in `field`. What lies on them is in `table`.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -134,14 +135,18 @@ class Stand:
         self.slots = list(pieces_of(hand, golden))
 
     def settle(self, hand: Sequence[int], golden: bool) -> None:
-        """Makes the rack agree with a hand: takes out what is not in it, and puts what is missing into free slots."""
-        wanted = pieces_of(hand, golden)
+        """Makes the rack agree with a hand: takes out what is not in it, and puts what is missing into free slots.
+
+        As in `take`, the leftmost of several pieces of one kind are taken out.
+        """
+        pieces = pieces_of(hand, golden)
+        surplus = Counter(filter(None, self.slots)) - Counter(pieces)
         for slot, piece in enumerate(self.slots):
-            if piece is not None:
-                if piece in wanted:
-                    wanted.remove(piece)
-                else:
-                    self.slots[slot] = None
+            if piece is not None and surplus[piece]:
+                surplus[piece] -= 1
+                self.slots[slot] = None
+        missing = Counter(pieces) - Counter(filter(None, self.slots))
+        wanted = [piece for piece in dict.fromkeys(pieces) for _ in range(missing[piece])]
         for slot, piece in enumerate(self.slots):
             if piece is None and wanted:
                 self.slots[slot] = wanted.pop(0)

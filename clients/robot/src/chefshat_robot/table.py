@@ -25,7 +25,7 @@ class TableState:
         shift: number of the Shift, from 1; 0 before the first.
         pizza: number of the pizza in the Shift, from 1.
         faces: number of faces F, by default 11.
-        hand: own cards as F+1 counts, the jokers last; empty if unknown.
+        hand: own cards as F+1 counts, the jokers last; empty if unknown. Gifts are in it until the exchange is complete.
         golden: whether the own hand has the Golden card.
         board_face: 0 for an empty board, else 1..F, or F+1 for a lone joker.
         board_size: cards on the board, jokers included.
@@ -114,11 +114,15 @@ def follow(state: TableState, event: pb.GameEvent) -> TableState:
 
 def observe(state: TableState, seen: pb.Observation) -> TableState:
     """Returns the state corrected by the observation of a decision. They differ after a correction at a physical table."""
+    hand = tuple(seen.hand)
+    if seen.gave and not seen.received:
+        # The events of the exchange, which are still to come, take the gifts out of the hand.
+        hand = tuple(own + given for own, given in zip(hand, seen.gave, strict=True))
     return replace(
         state,
         shift=seen.shift,
         pizza=max(seen.pizza, 1),
-        hand=tuple(seen.hand),
+        hand=hand,
         golden=seen.golden,
         board_face=seen.board_face,
         board_size=seen.board_size,
