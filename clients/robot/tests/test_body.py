@@ -65,12 +65,16 @@ def test_a_turn_is_said_looked_at_and_laid_from_the_stand_to_the_field() -> None
     run(test())
 
 
-def test_a_pass_puts_the_pass_card_down_and_takes_it_back_when_the_pizza_is_done() -> None:
+@pytest.mark.parametrize(
+    "end",
+    [pizza_done(0, 0), {"shift_ended": pb.ShiftEnded(shift=1, order=[0, 1, 2, 3], shift_points=[0] * 4, points=[0] * 4)}],
+)
+def test_a_pass_puts_the_pass_card_down_and_takes_it_back_at_the_end_of_the_pizza(end: dict[str, object]) -> None:
     async def test() -> None:
         robot, notices = ScriptedRobot(), list[Notice]()
         body = await table(robot, notices)
         await body.take_turn(PASS).wait()
-        for event in list(numbered({}, {}, passed(1), pizza_done(0, 0)))[2:]:
+        for event in list(numbered({}, {}, passed(1), end))[2:]:
             body.on_event(event)
         await body.idle()
         there, back = carried(robot)

@@ -328,7 +328,7 @@ class Body:
             # A seat that chooses its gifts receives the others' first. But its own have left the rack before those are put in.
             if self._has_given:
                 stand.settle(after.hand, after.golden)
-        elif kind == "pizza_done":
+        elif kind in ("pizza_done", "shift_ended"):  # The last pizza of a Shift may not be done.
             self._take_pass_back(after, live)
 
     def _take_pass_back(self, state: TableState, live: bool = True) -> None:
