@@ -25,6 +25,7 @@ from chefshat_robot.vision import (
     Laid,
     PassShown,
     PassWithdrawn,
+    SourceError,
     TakenBack,
 )
 from chefshat_robot.vision.hand import HandReader, HandSeen
@@ -506,3 +507,16 @@ def test_a_hand_that_was_refused_is_not_reported_in_each_frame(
     assert table.kinds() == ["hand", "hand"]
     # The camera ended before the game.
     assert "no more pictures" in caplog.text
+
+
+def test_a_hand_whose_camera_fails_ends_only_its_own_watching(
+    table: Table, bridge: Bridge, caplog: pytest.LogCaptureFixture
+) -> None:
+    bridge.state = table.state
+
+    def frames() -> Iterator[Frame]:
+        yield FRAME
+        raise SourceError("camera 1 sends no more pictures; check its cable")
+
+    run(bridge.watch_hand(2, cast("HandReader", Same()), frames()))
+    assert "the hand of seat 2 gives no more pictures: camera 1 sends no more pictures; check its cable" in caplog.text

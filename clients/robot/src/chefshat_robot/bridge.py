@@ -22,7 +22,19 @@ import cv2
 from chefshat import Backoff, ChefsHatError, pb
 
 from chefshat_robot.deck import FACES, Card
-from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, FieldChanged, FieldState, Frame, Laid, Observed, Picture, TakenBack
+from chefshat_robot.vision import (
+    Cleared,
+    Doubt,
+    DoubtResolved,
+    FieldChanged,
+    FieldState,
+    Frame,
+    Laid,
+    Observed,
+    Picture,
+    SourceError,
+    TakenBack,
+)
 from chefshat_robot.vision import PassShown as PassSeen
 from chefshat_robot.vision import PassWithdrawn as PassGone
 from chefshat_robot.vision.hand import HandReader
@@ -197,16 +209,21 @@ class Bridge:
         """
         hand: list[Card] = []
         reported: tuple[int, list[Card]] | None = None
-        while not self._is_over() and (frame := await asyncio.to_thread(next, frames, None)) is not None:
-            seen = await asyncio.to_thread(reader.see, frame)
-            if seen is not None:
-                hand = list(seen.cards)
-            # One that was refused is not reported again in the same Shift.
-            if self._awaits_hand(seat, len(hand)) and (now := (self._shift(), hand)) != reported:
-                reported = now
-                await self._report(pb.TableReport(hand=pb.HandSeen(seat=seat, cards=seen_cards(hand))))
+        reason = "they have ended"
+        try:
+            while not self._is_over() and (frame := await asyncio.to_thread(next, frames, None)) is not None:
+                seen = await asyncio.to_thread(reader.see, frame)
+                if seen is not None:
+                    hand = list(seen.cards)
+                # One that was refused is not reported again in the same Shift.
+                if self._awaits_hand(seat, len(hand)) and (now := (self._shift(), hand)) != reported:
+                    reported = now
+                    await self._report(pb.TableReport(hand=pb.HandSeen(seat=seat, cards=seen_cards(hand))))
+        except SourceError as error:
+            # The attendant can type the hand, so the camera above the table is still watched.
+            reason = str(error)
         if not self._is_over():
-            LOG.warning("the camera at the hand of %s gives no more pictures", self._name(seat))
+            LOG.warning("the camera at the hand of %s gives no more pictures: %s", self._name(seat), reason)
 
     def _shift(self) -> int:
         """The number of the Shift; 0 before the first state."""
