@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import time
+import itertools
+import threading
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from typing import cast
@@ -11,7 +12,7 @@ from typing import cast
 import grpc
 import numpy as np
 import pytest
-from chefshat import Backoff, ChefsHatError, pb
+from chefshat import ChefsHatError, pb
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.deck import Card, deck
@@ -30,7 +31,7 @@ from chefshat_robot.vision import (
 )
 from chefshat_robot.vision.hand import HandReader, HandSeen
 from chefshat_robot.vision.perception import Perception
-from tests.loop import run
+from tests.loop import LIMIT_S, run, until
 
 CARDS = {face: [card for card in deck(0) if card.face == face] for face in range(1, 13)}
 FRAME = Frame(0, 0.0, np.zeros((4, 4, 3), dtype=np.uint8))
@@ -42,11 +43,13 @@ class Table:
     Attributes:
         reports: what was reported.
         verdicts: verdicts of the next reports; then all are accepted.
+        calls: how often something was reported, also in vain.
         state: returned with each response.
     """
 
     def __init__(self) -> None:
         self.reports: list[pb.TableReport] = []
+        self.calls = 0
         self.verdicts: list[pb.ReportVerdict.ValueType] = []
         self.state = pb.TableState(version=1)
         self.error: ChefsHatError | None = None
@@ -54,6 +57,7 @@ class Table:
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
         assert table_ticket == "ticket"
         assert report_id
+        self.calls += 1
         if self.error is not None:
             raise self.error
         self.reports.append(report)
@@ -419,43 +423,80 @@ def test_no_two_questions_have_one_id_and_the_open_ones_end_with_the_bridge(tabl
 
 
 class Away(Table):
-    """A table whose server is away for the first attempts of each report."""
+    """A table whose server is away until the test says otherwise: a report waits."""
 
-    def __init__(self, attempts: int) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.attempts = attempts
-        self.ids: list[str] = []
-        self.away = asyncio.Event()
+        self.asked = threading.Event()
+        self.back = threading.Event()
 
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
-        self.ids.append(report_id)
-        if self.ids.count(report_id) <= self.attempts:
-            self.away.set()
-            raise ChefsHatError("UNAVAILABLE", "no server answers", code=grpc.StatusCode.UNAVAILABLE)
+        self.asked.set()
+        await until(self.back.is_set)
         return await super().report(table_ticket, report, report_id=report_id)
 
 
-def test_frames_are_watched_while_a_report_is_tried_again(eyes: Eyes) -> None:
-    table = Away(attempts=3)
-    bridge = Bridge(table, "ticket", cast("Perception", eyes), backoff=Backoff(first_s=0.01, max_s=0.01))
+def test_frames_are_watched_while_a_report_waits(eyes: Eyes) -> None:
+    table = Away()
+    bridge = Bridge(table, "ticket", cast("Perception", eyes))
     eyes.events = [[laid(CARDS[9][:2])], [], [laid(CARDS[7][:2])]]
     watched: list[int] = []
 
     def frames() -> Iterator[Frame]:
         for number in range(4):
-            # The last frames come while the first report is being tried again.
-            while number == 2 and not table.away.is_set():
-                time.sleep(0.001)
+            if number == 2:
+                assert table.asked.wait(LIMIT_S)
             watched.append(len(table.reports))
             yield FRAME
+        table.back.set()
 
     run(bridge.run(frames()))
+    assert watched == [0, 0, 0, 0]
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [7, 7]]
-    # A report keeps its id when it is repeated.
-    assert [table.ids.count(number) for number in dict.fromkeys(table.ids)] == [4, 4]
-    lasting = Bridge(Away(attempts=3), "ticket", cast("Perception", eyes), backoff=Backoff(first_s=0.0, attempts=2))
+
+
+def test_a_server_that_is_away_is_reported(
+    bridge: Bridge, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("chefshat_robot.bridge.AWAY_S", 0.0)
+    bridge.table = away = Away()
+
+    async def test() -> None:
+        reporting = asyncio.create_task(bridge.observed(laid(CARDS[9][:2])))
+        await until(lambda: "the server is away" in caplog.text)
+        away.back.set()
+        await reporting
+
+    run(test())
+    assert away.kinds() == ["laid"]
+
+
+def test_a_report_that_the_table_gives_up_is_not_tried_again(table: Table, bridge: Bridge) -> None:
+    table.error = ChefsHatError("UNAVAILABLE", "no server answers", code=grpc.StatusCode.UNAVAILABLE)
     with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
-        run(lasting.observed(laid(CARDS[9][:2])))
+        run(bridge.observed(laid(CARDS[9][:2])))
+    assert table.calls == 1
+
+
+def test_a_bridge_that_is_cancelled_ends_although_the_server_is_away(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("chefshat_robot.bridge.WITHDRAW_S", 0.01)
+    away, watching = Away(), threading.Event()
+
+    def frames() -> Iterator[Frame]:
+        watching.set()
+        yield from itertools.repeat(FRAME)
+
+    async def test() -> None:
+        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+        bridge.table = away
+        running = asyncio.create_task(bridge.run(frames()))
+        await until(watching.is_set)
+        running.cancel()
+        await asyncio.wait([running])
+        assert running.cancelled()
+
+    run(test())
+    assert away.asked.is_set(), "it has tried to withdraw its question"
 
 
 class Hand:

@@ -16,6 +16,7 @@ from chefshat_robot.body import Body, Notice, Turn
 from chefshat_robot.drivers.driver import Affect, CardMove, Done, Express, Failed, Pick, Pose, Say
 from chefshat_robot.player import RobotPlayer
 from chefshat_robot.robot import attendant, play_seat
+from chefshat_robot.running import Sender
 from chefshat_robot.words import TEXTS, Words
 from tests.loop import run
 from tests.robots import ScriptedRobot
@@ -303,3 +304,21 @@ def test_lines_travel_in_expressions_within_the_protocols_limit() -> None:
         assert carried is not None
         assert carried == text or (carried.endswith("…") and text.startswith(carried[:-1]))
     assert speech.text_of(pb.Expression(label="joy")) is None
+
+
+class Away(Sender[str]):
+    """A sender whose server is away."""
+
+    async def _deliver(self, item: str) -> None:
+        await asyncio.Event().wait()
+
+
+def test_what_cannot_be_sent_at_the_end_is_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr("chefshat_robot.running.DRAIN_S", 0.01)
+
+    async def test() -> None:
+        async with aio.Client("127.0.0.1:1") as client, Away(client, "ticket") as sender:
+            sender.send("I pass.")
+
+    run(test())
+    assert "was not sent to the server within 0.01 s" in caplog.text

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import random
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import aclosing
@@ -19,7 +18,7 @@ from functools import partial
 from typing import Protocol, TypeAlias
 
 import cv2
-from chefshat import Backoff, ChefsHatError, pb
+from chefshat import ChefsHatError, pb
 
 from chefshat_robot.deck import FACES, Card
 from chefshat_robot.vision import (
@@ -47,6 +46,12 @@ MAX_PICTURE_BYTES = 32 * 1024
 SIDES = 4
 """At tables with so many seats or fewer, each has a side of the field of its own."""
 
+AWAY_S = 5.0
+"""Seconds that a report takes until a warning says that the server is away."""
+
+WITHDRAW_S = 3.0
+"""Seconds for withdrawing open questions at the end: the server may be away."""
+
 OnAnswer: TypeAlias = Callable[[int | None], Awaitable[None]]
 """What is done with the index of the right option of a question; None if somebody withdrew it."""
 
@@ -60,7 +65,7 @@ class Table(Protocol):
     """The calls that a bridge makes, as `chefshat.aio.Client.tables` has them."""
 
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
-        """Reports something that happened."""
+        """Reports something that happened. Repeats it while the server is away."""
 
     def watch(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
         """Iterates over the states of the table."""
@@ -117,7 +122,6 @@ class Bridge:
         ticket: The ticket of the table.
         perception: What watches the field.
         on_report: Called with each report and its response, for a display or a log.
-        backoff: The delays between attempts to report while the server is away.
 
     Attributes:
         state: The newest state of the table; None before the first.
@@ -128,7 +132,6 @@ class Bridge:
     perception: Perception
     on_report: Callable[[pb.TableReport, pb.ReportResponse], None] = lambda _report, _response: None
     state: pb.TableState | None = None
-    backoff: Backoff = field(default_factory=Backoff)
     _session: str = field(default_factory=lambda: secrets.token_hex(4))
     _reports: int = 0
     _play: _Play | None = None
@@ -446,10 +449,11 @@ class Bridge:
                 await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question.question_id)))
 
     async def _withdraw_all(self) -> None:
-        """Withdraws the open questions: nobody would hear the answers."""
-        with contextlib.suppress(ChefsHatError):
-            for name in list(self._asked):
-                await self._withdraw(name)
+        """Withdraws the open questions: nobody would hear the answers. The next bridge withdraws what this one cannot."""
+        with contextlib.suppress(ChefsHatError, TimeoutError):
+            async with asyncio.timeout(WITHDRAW_S):
+                for name in list(self._asked):
+                    await self._withdraw(name)
 
     async def _take_answers(self) -> None:
         """Does what the answers that arrived ask for."""
@@ -463,21 +467,16 @@ class Bridge:
             await question.on_answer(answer.option if answer.HasField("option") else None)
 
     async def _report(self, report: pb.TableReport) -> pb.ReportResponse:
-        """Reports something. Repeats it while the server is away."""
+        """Reports something. The table repeats it while the server is away."""
         report.source = pb.REPORT_SOURCE_CAMERA
         self._reports += 1
-        number = f"{self._session}-{self._reports}"
-        failures = 0
-        while True:
-            try:
-                response = await self.table.report(self.ticket, report, report_id=number)
-                break
-            except ChefsHatError as error:
-                failures += 1
-                if not error.retryable or failures > self.backoff.attempts:
-                    raise
-                LOG.warning("the server does not take a report, which is tried again: %s", error)
-                await asyncio.sleep(self.backoff.delay_s(failures, random.Random()))
+        late = asyncio.get_running_loop().call_later(
+            AWAY_S, LOG.warning, "the server is away; a report is tried again until it is back"
+        )
+        try:
+            response = await self.table.report(self.ticket, report, report_id=f"{self._session}-{self._reports}")
+        finally:
+            late.cancel()
         self._newer(response.state)
         self.on_report(report, response)
         return response

@@ -18,6 +18,8 @@ from chefshat_robot.drivers.driver import LOG, RobotError
 
 #: The default address of the server.
 SERVER = "127.0.0.1:50051"
+# Seconds for what still waits to be sent at the end: the server may be away.
+DRAIN_S = 5.0
 
 Item = TypeVar("Item")
 
@@ -48,7 +50,10 @@ def run_command(command: Callable[[], Coroutine[Any, Any, int]], *, quiet: bool 
 
 
 class Sender(ABC, Generic[Item]):
-    """Sends items, in order, in the background. An asynchronous context manager: leaving sends what waits."""
+    """Sends items, in order, in the background. An asynchronous context manager: leaving sends what waits.
+
+    After `DRAIN_S` it gives up.
+    """
 
     def __init__(self, client: aio.Client, ticket: str) -> None:
         """Sets where to send.
@@ -78,7 +83,11 @@ class Sender(ABC, Generic[Item]):
     async def __aexit__(self, *_: object) -> None:
         self._waiting.put_nowait(None)
         if self._task is not None:
-            await self._task
+            try:
+                async with asyncio.timeout(DRAIN_S):
+                    await self._task
+            except TimeoutError:
+                LOG.warning("what the robot said and did last was not sent to the server within %g s", DRAIN_S)
 
     async def _run(self) -> None:
         while (item := await self._waiting.get()) is not None:
