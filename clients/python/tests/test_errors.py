@@ -6,15 +6,16 @@ import random
 import re
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 
 import grpc
 import pytest
 from fake_server import FakeServer
 from proxy import Proxy
+from waiting import LIMIT_S
 
 import chefshat
-from chefshat import Backoff, ChefsHatError, aio, channels
+from chefshat import Backoff, ChefsHatError, RandomAgent, aio, channels, pb
 from chefshat.errors import exit_code
 
 
@@ -59,7 +60,7 @@ def test_without_details_the_code_is_the_reason() -> None:
         assert caught.value.retryable
         assert re.search(r"127\.0\.0\.1:1\b.*chefshat serve.*HOST:PORT", caught.value.message)
         with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
-            client.play(chefshat.RandomAgent(), "ticket")
+            client.play(RandomAgent(), "ticket")
 
 
 def test_a_slow_connection_is_awaited(fake: FakeServer) -> None:
@@ -91,7 +92,7 @@ def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) 
     client.close()
     for call in (
         client.server_info,
-        lambda: client.play(chefshat.RandomAgent(), "ticket"),
+        lambda: client.play(RandomAgent(), "ticket"),
         lambda: list(client.records.read("game")),
     ):
         with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
@@ -124,17 +125,29 @@ def test_a_client_that_is_closed_while_a_call_begins_says_so(silent: str, kind: 
         getattr(channel, kind)("/service/Call", request_serializer=closing)(None)
 
 
-def test_a_client_of_asyncio_that_is_closed_during_a_call_says_so(silent: str) -> None:
+async def estimates(client: aio.Client) -> list[pb.EvaluateResponse]:
+    """What the server estimates of a decision."""
+    return [estimate async for estimate in client.evaluate(pb.EvaluateRequest())]
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [lambda client: client.rooms.create(), lambda client: client.play(RandomAgent(), "ticket"), estimates],
+    ids=["create", "play", "evaluate"],
+)
+def test_a_client_of_asyncio_that_is_closed_during_a_call_says_so(
+    silent: str, begin: Callable[[aio.Client], Coroutine[None, None, object]]
+) -> None:
     async def close_during_a_call() -> None:
         client = aio.Client(silent, timeout=None)
-        call = asyncio.create_task(client.rooms.create())
+        call = asyncio.create_task(begin(client))
         await asyncio.sleep(0)
         await client.close()
-        await call
+        await asyncio.wait_for(call, LIMIT_S)
 
     async def cancel() -> None:
         async with aio.Client(silent, timeout=None) as client, asyncio.timeout(0.1):
-            await client.rooms.create()
+            await begin(client)
 
     with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
         asyncio.run(close_during_a_call())

@@ -243,6 +243,32 @@ def test_exceptions_between_connections_propagate(fake: FakeServer) -> None:
         asyncio.run(run())
 
 
+class Slow(Agent):
+    """Never answers."""
+
+    def __init__(self) -> None:
+        self.asked = asyncio.Event()
+
+    async def decide(self, request: Decision) -> int:
+        self.asked.set()
+        await asyncio.Event().wait()
+        raise AssertionError("unreachable")
+
+
+def test_closing_the_client_ends_a_game_of_asyncio_with_an_error(fake: FakeServer) -> None:
+    (ticket,) = seats(fake, played=1)
+
+    async def run() -> None:
+        agent, client = Slow(), aio.Client(fake.address)
+        playing = asyncio.create_task(client.play(agent, ticket))
+        await agent.asked.wait()
+        await client.close()
+        await playing
+
+    with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+        asyncio.run(run())
+
+
 def test_an_unknown_ticket_stops_only_its_seat(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     results = play(fake.address, {"nonsense": RandomAgent(), ticket: RandomAgent()})

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import sys
 from pathlib import Path
 
 import pytest
-from chefshat import RandomAgent, aio, pb
+from chefshat import ChefsHatError, RandomAgent, aio, pb
 
 from chefshat_robot import cli, drivers, layout, speech
 from chefshat_robot.affect import Forwarder
@@ -16,7 +17,7 @@ from chefshat_robot.body import Body, Notice, Turn
 from chefshat_robot.drivers.driver import Affect, CardMove, Done, Express, Failed, Pick, Pose, Say
 from chefshat_robot.player import RobotPlayer
 from chefshat_robot.robot import attendant, play_seat
-from chefshat_robot.running import Sender
+from chefshat_robot.running import Sender, live_from
 from chefshat_robot.words import TEXTS, Words
 from tests.loop import run
 from tests.robots import ScriptedRobot
@@ -322,3 +323,17 @@ def test_what_cannot_be_sent_at_the_end_is_given_up(monkeypatch: pytest.MonkeyPa
 
     run(test())
     assert "was not sent to the server within 0.01 s" in caplog.text
+
+
+def test_a_client_that_is_closed_while_a_room_is_looked_up_says_so() -> None:
+    async def test(address: str) -> None:
+        client = aio.Client(address)
+        looking = asyncio.create_task(live_from(client, "room"))
+        await asyncio.sleep(0)
+        await client.close()
+        with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+            await looking
+
+    # A server that accepts connections and never answers.
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        run(test(f"127.0.0.1:{listener.getsockname()[1]}"))

@@ -12,6 +12,7 @@ from chefshat import pb
 from chefshat._async.calls import AsyncCalls
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
+from chefshat.requests import closed_is_an_error
 from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 
@@ -65,20 +66,29 @@ class _Run:
         self._thinking: set[asyncio.Task[None]] = set()
 
     async def connection(self, call: PlayCall) -> ChefsHatError:
-        """Plays over one connection until it is lost or the session is done. Returns the error that ended it."""
+        """Plays over one connection until it is lost or the session is done.
+
+        Returns:
+            The error that ended it.
+
+        Raises:
+            ChefsHatError: the client was closed.
+        """
         session = self._session
         session.connected()
         self._call = call
         try:
-            await self._flush(call)
-            while not session.done:
-                response = await call.read()
-                if not isinstance(response, pb.PlayResponse):
-                    return connection_lost()
-                for ask in session.receive(response):
-                    self._decide(ask)
+            with closed_is_an_error():
+                await _opened(call)
                 await self._flush(call)
-            await _part(call)
+                while not session.done:
+                    response = await call.read()
+                    if not isinstance(response, pb.PlayResponse):
+                        return connection_lost()
+                    for ask in session.receive(response):
+                        self._decide(ask)
+                    await self._flush(call)
+                await _part(call)
         except grpc.RpcError as error:
             return from_rpc_error(error)
         except asyncio.InvalidStateError:
@@ -123,6 +133,18 @@ class _Run:
                 return  # The session repeats the answers of a lost connection.
             for request in self._session.take_requests():
                 await call.write(request)
+
+
+async def _opened(call: PlayCall) -> None:
+    """Waits until requests can be written. gRPC alone would wait for ever if the client is closed before."""
+    opened = asyncio.ensure_future(call.wait_for_connection())
+
+    def ended(_: PlayCall) -> None:
+        if call.cancelled():
+            opened.cancel()
+
+    call.add_done_callback(ended)
+    await opened
 
 
 async def _part(call: PlayCall) -> None:

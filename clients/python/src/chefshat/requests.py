@@ -4,6 +4,7 @@ import asyncio
 import secrets
 import time
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Protocol, TypeAlias, TypeVar
 
 from chefshat import pb
@@ -213,20 +214,26 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
     pauses = _pauses(request)
     while True:
         try:
-            return await method(request)
+            with closed_is_an_error():
+                return await method(request)
         except grpc.RpcError as error:
             pause = _pause_after(error, pauses)
-        except asyncio.CancelledError:
-            if _is_cancelled():
-                raise
-            raise closed() from None
         await asyncio.sleep(pause)
 
 
-def _is_cancelled() -> bool:
-    """Whether the current task is cancelled, and not only its call, by closing the channel."""
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
+@contextmanager
+def closed_is_an_error() -> Iterator[None]:
+    """Raises `ChefsHatError` if the channel is closed during a call of asyncio.
+
+    gRPC cancels the call then, which looks as if the task were cancelled.
+    """
+    try:
+        yield
+    except asyncio.CancelledError:
+        task = asyncio.current_task()
+        if task is not None and task.cancelling():
+            raise
+        raise closed() from None
 
 
 def received(call: Streamed[Answered]) -> Iterator[Answered]:
@@ -236,13 +243,9 @@ def received(call: Streamed[Answered]) -> Iterator[Answered]:
 
 async def async_received(call: AsyncStreamed[Answered]) -> AsyncIterator[Answered]:
     """Yields the messages of a call of asyncio. Raises `ChefsHatError` if the channel is closed meanwhile."""
-    try:
+    with closed_is_an_error():
         async for message in call:
             yield message
-    except asyncio.CancelledError:
-        if _is_cancelled():
-            raise
-        raise closed() from None
 
 
 def streamed(method: Callable[[Asked], Streamed[Answered]], request: Asked) -> Iterator[Answered]:

@@ -12,6 +12,7 @@ from typing import Any, Generic, Self, TypeVar
 import grpc
 from chefshat import ChefsHatError, aio, pb
 from chefshat.errors import INTERRUPTED, from_rpc_error
+from chefshat.requests import async_received
 
 from chefshat_robot.cli import CommandError
 from chefshat_robot.drivers.driver import LOG, RobotError
@@ -104,7 +105,7 @@ async def live_from(client: aio.Client, room_id: str) -> int:
     """
     call = client.rooms._spectators.Watch(pb.SpectatorServiceWatchRequest(room_id=room_id, snapshot=True))
     try:
-        async for response in call:
+        async for response in async_received(call):
             return response.snapshot.next_sequence
     except grpc.RpcError as failure:
         error = from_rpc_error(failure)

@@ -28,7 +28,7 @@ from chefshat.clock import READINGS, TIME_OF_DAY, ClockReading, LocalClock
 from chefshat.errors import from_rpc_error
 from chefshat.network import grpc
 from chefshat.participant import MakeAgent, OnEntered
-from chefshat.requests import awaited
+from chefshat.requests import async_received, awaited
 from chefshat.result import SeatResult
 from chefshat.session import PlayOptions, PlaySession
 
@@ -127,7 +127,7 @@ class AsyncCalls(ABC):
         """
         call = self._analysis.Evaluate(request)
         try:
-            async for response in call:
+            async for response in async_received(call):
                 yield response
         except grpc.RpcError as error:
             raise from_rpc_error(error) from error
