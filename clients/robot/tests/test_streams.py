@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import uuid
 from typing import Any
 
@@ -118,6 +119,23 @@ def test_streams_of_text_and_of_numbers_become_expressions(server_address: str) 
             await asyncio.gather(*streams, return_exceptions=True)
 
     run(test())
+
+
+def test_what_an_analyser_does_not_know_is_left_out(caplog: pytest.LogCaptureFixture) -> None:
+    async def test() -> Affect:
+        source = uuid.uuid4().hex
+        info = pylsl.StreamInfo("tension", "Affect", 3, 0, pylsl.cf_float32, source)
+        info.set_channel_labels(["valence", "arousal", "pupil"])
+        outlet = pylsl.StreamOutlet(info)
+        reading = asyncio.ensure_future(anext(stream_affects("source_id", source)))
+        assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
+        outlet.push_sample([math.nan, math.nan, 3.0])
+        outlet.push_sample([0.5, math.nan, 3.0])
+        return await reading
+
+    affect = run(test())
+    assert (affect.label, affect.valence, affect.arousal) == ("tension", 0.5, None)
+    assert "ignored a sample" not in caplog.text
 
 
 def test_a_stream_without_the_channels_is_refused() -> None:

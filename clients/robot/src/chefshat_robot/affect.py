@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import math
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from typing import Any
@@ -177,8 +178,12 @@ async def stream_affects(key: str, value: str) -> AsyncIterator[Affect]:
                     if not isinstance(message, dict):
                         raise wire.WireError("a sample must be a JSON object")
                 else:
-                    message = {"label": info.name(), **{label: float(x) for label, x in zip(labels, sample, strict=True)}}
-                    message = {name: entry for name, entry in message.items() if name == "label" or name in numbers}
+                    read = {label: float(x) for label, x in zip(labels, sample, strict=True)}
+                    # NaN says that the analyser does not know, for instance while it sees no face.
+                    known = {name: x for name, x in read.items() if name in numbers and not math.isnan(x)}
+                    if not known:
+                        continue
+                    message = {"label": info.name(), **known}
                 yield wire.affect_from_json({"taken_at": time.time() - ago, **message})
             except ValueError as error:
                 LOG.warning("ignored a sample of %s: %s", info.name(), error)
