@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -39,12 +40,14 @@ class Icub:
     """A name server, and a module with two ports.
 
     Attributes:
+        asked: names of ports that the name server was asked for.
         got: bottles that arrived, with "d" or "do" before them.
         reply: what the module replies; None: nothing.
         listeners: connections that read events.
     """
 
     def __init__(self) -> None:
+        self.asked: list[str] = []
         self.got: list[tuple[str, str]] = []
         self.reply: str | None = "[ok]"
         self.listeners: list[asyncio.StreamWriter] = []
@@ -56,6 +59,7 @@ class Icub:
         line = (await reader.readline()).decode().split()
         if line[:2] != ["NAME_SERVER", "query"]:
             return
+        self.asked.append(line[2])
         port = self.ports.get(line[2], 0)
         ip, kind = ("127.0.0.1", "tcp") if port else ("none", "none")
         writer.write(f"registration name {line[2]} ip {ip} port {port} type {kind}\r\n*** end of message\r\n".encode())
@@ -171,6 +175,28 @@ def test_what_the_robot_perceives_is_read_from_its_port(caplog: pytest.LogCaptur
     run(test())
     assert '"dance" 1 is not a heard, button or affect' in caplog.text
     assert "a parenthesis is not closed" in caplog.text
+
+
+def test_a_port_of_events_that_was_away_is_read_again(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr("chefshat_robot.drivers.yarp.REOPEN_S", 0.01)
+    caplog.set_level(logging.INFO)
+
+    async def test() -> None:
+        async with pair() as (driver, icub):
+            await until(lambda: icub.listeners)
+            # The module with this port ends, and starts again after a while.
+            there, icub.ports[EVENTS] = icub.ports[EVENTS], 0
+            icub.listeners.pop().close()
+            asked = len(icub.asked)
+            await until(lambda: icub.asked[asked:].count(EVENTS) >= 3)
+            icub.ports[EVENTS] = there
+            await until(lambda: icub.listeners)
+            icub.perceive("button chest")
+            assert await anext(driver.events()) == Button("chest")
+
+    run(test())
+    assert caplog.text.count(f"the connection to {EVENTS} was lost") == 1
+    assert caplog.text.count("perception is not available") == 1
 
 
 def test_missing_name_servers_and_ports_are_explained() -> None:

@@ -13,6 +13,7 @@ text mode, and sends a bottle for each act; the module replies `ok` when the act
     event 12 3456 "play" "{...}"                                                     sequence, elapsed_ms, kind, fields as JSON
 
 Events need no reply. If the module has an output port, by default `/chefshat/robot/events:o`, the driver reads from it
+while it is there, also if it starts later or again
 
     heard "words" 0.9
     button "name"
@@ -52,6 +53,8 @@ OWN_NAME = "/chefshat/driver"
 _REGISTRATION = re.compile(r"registration name (\S+) ip (\S+) port (\d+)")
 # Seconds for finding a port and connecting to it.
 CONNECT_S = 5.0
+# Seconds until the port with what the robot perceives is looked for again.
+REOPEN_S = 5.0
 
 
 class YarpDriver(Driver):
@@ -156,22 +159,35 @@ class YarpDriver(Driver):
             writer.close()
 
     async def _listen(self) -> None:
-        """Reads what the robot perceives, if it has a port for it."""
+        """Reads what the robot perceives, whenever it has a port for it: the module may start later, and again."""
+        is_missing = False
+        while True:
+            try:
+                reader, writer = await self._open(self._events_port)
+            except (OSError, RobotError) as error:
+                # Once: a robot need not have such a port.
+                if not is_missing:
+                    LOG.info("the robot's perception is not available: %s", error)
+                is_missing = True
+            else:
+                is_missing = False
+                await self._hear(reader, writer)
+            await asyncio.sleep(REOPEN_S)
+
+    async def _hear(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Reads what the robot perceives until the connection ends."""
+        reason = "it was closed"
         try:
-            reader, writer = await self._open(self._events_port)
-        except (OSError, RobotError) as error:
-            LOG.info("the robot's perception is not available: %s", error)
-            return
-        writer.write(b"r\n")
-        try:
+            writer.write(b"r\n")
             while line := await reader.readline():
                 # Each bottle follows a line with "do" or "d", and perhaps a number and a time.
                 if line.split()[:1] in ([b"do"], [b"d"]):
                     self._receive((await reader.readline()).decode(errors="replace"))
         except (OSError, ValueError) as error:
-            LOG.warning("the connection to %s failed: %s", self._events_port, error)
+            reason = str(error)
         finally:
             writer.close()
+        LOG.warning("the connection to %s was lost and is tried again: %s", self._events_port, reason)
 
     def _receive(self, line: str) -> None:
         try:
