@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import os
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
@@ -393,6 +396,33 @@ def test_a_recording_gives_the_same_events_again(tmp_path: Path) -> None:
     assert happened(again) == before_doubt
     with pytest.raises(FileExistsError):
         Recorder(tmp_path)
+
+
+class FullDisk(io.StringIO):
+    """A file that cannot be written to."""
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def close(self) -> None:
+        super().close()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize("lost", ["lines", "frames"])
+def test_a_full_disk_ends_the_recording_and_not_what_it_records(
+    lost: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    table = SyntheticTable([LayCards(0.6, 1, (Card(0, 40),), (1,))], EASY, seed=9)
+    with Recorder(tmp_path, frames=True) as recorder:
+        if lost == "lines":
+            recorder._sightings.close()
+            recorder._sightings = FullDisk()
+        else:
+            shutil.rmtree(tmp_path / "frames")
+        assert happened(watch(table, Perception(table.camera, recorder=recorder))) == [("laid", (1, Card(0, 40)))]
+    assert caplog.text.count(f"the recording in {tmp_path} ends here") == 1
+    assert (tmp_path / "events.jsonl").read_text() == "", "nothing follows"
 
 
 def test_a_damaged_recording_is_refused(tmp_path: Path) -> None:

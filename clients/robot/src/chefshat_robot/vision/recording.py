@@ -8,6 +8,7 @@ frames again also tests the reading of tags, but their compression may change wh
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -22,13 +23,14 @@ from .events import Observed, to_json
 from .frames import Frame
 from .reader import Sighting
 
+LOG = logging.getLogger("chefshat_robot")
 VERSION = 1
 """Version of the format."""
 JPEG_QUALITY = 92
 
 
 class Recorder:
-    """Writes a recording.
+    """Writes a recording. If it cannot be written any more, for instance to a full disk, a warning says so, and it ends there.
 
     Args:
         folder: The folder; it is created, and must not hold a recording yet.
@@ -37,35 +39,57 @@ class Recorder:
 
     Raises:
         FileExistsError: The folder holds a recording.
+        OSError: The recording cannot be begun.
     """
 
     def __init__(self, folder: Path, deck: int | None = None, frames: bool = False) -> None:
         self._frames = folder / "frames" if frames else None
         (self._frames or folder).mkdir(parents=True, exist_ok=True)
-        self._sightings = (folder / "sightings.jsonl").open("x", encoding="utf-8")
-        self._events = (folder / "events.jsonl").open("w", encoding="utf-8")
-        _write(self._sightings, {"recording": VERSION, "deck": deck})
+        self._sightings: TextIO = (folder / "sightings.jsonl").open("x", encoding="utf-8")
+        self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
+        self._folder = folder
+        self._is_over = False
+        self._write(self._sightings, {"recording": VERSION, "deck": deck})
 
     def saw(self, frame: Frame, sighting: Sighting) -> None:
         """Writes what a frame showed."""
-        _write(self._sightings, sighting.to_json())
-        if self._frames is not None:
+        self._write(self._sightings, sighting.to_json())
+        if self._frames is not None and not self._is_over:
             path = self._frames / f"{frame.index:08}.jpg"
-            cv2.imwrite(str(path), frame.image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+            if not cv2.imwrite(str(path), frame.image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]):
+                self._end(f"{path} cannot be written")
 
     def answered(self, number: int, reading: Card | bool | None) -> None:
         """Writes the answer to a doubt."""
         value = {"deck": reading.deck, "index": reading.index} if isinstance(reading, Card) else reading
-        _write(self._sightings, {"answer": number, "reading": value})
+        self._write(self._sightings, {"answer": number, "reading": value})
 
     def reported(self, event: Observed) -> None:
         """Writes an event."""
-        _write(self._events, to_json(event))
+        self._write(self._events, to_json(event))
 
     def close(self) -> None:
         """Closes the files."""
-        self._sightings.close()
-        self._events.close()
+        for file in (self._sightings, self._events):
+            try:
+                file.close()
+            except OSError as error:
+                self._end(error)
+
+    def _write(self, file: TextIO, values: dict[str, Any]) -> None:
+        """Writes a line, unless an earlier one could not be written."""
+        if self._is_over:
+            return
+        try:
+            file.write(json.dumps(values, separators=(",", ":")) + "\n")
+        except OSError as error:
+            self._end(error)
+
+    def _end(self, reason: object) -> None:
+        """Ends the recording. The game is more important, so what watches it is not stopped."""
+        if not self._is_over:
+            LOG.warning("the recording in %s ends here: %s", self._folder, reason)
+        self._is_over = True
 
     def __enter__(self) -> Recorder:
         return self
@@ -98,7 +122,3 @@ def replay(folder: Path) -> Iterator[Observed]:
                     yield from decider.see(Sighting.from_json(values))
             except (KeyError, TypeError, ValueError) as error:
                 raise ValueError(f"{path}, line {number}: {error}") from error
-
-
-def _write(file: TextIO, values: dict[str, Any]) -> None:
-    file.write(json.dumps(values, separators=(",", ":")) + "\n")
