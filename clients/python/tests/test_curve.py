@@ -12,6 +12,7 @@ from chefshat.learn import __main__ as command
 from chefshat.learn.curve import figure, interquartile_mean, read
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.runs import EVALUATION_SEED
+from chefshat.learn.training_log import Progress, entries, last_evaluated, log_evaluations, log_setup, written
 
 
 def a_look(decisions: int, points: float) -> dict[str, object]:
@@ -65,6 +66,22 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         assert capsys.readouterr().err.startswith(f"error: {log}: this is not a log")
     assert command.main(["curve", str(tmp_path / "missing"), "--out", str(out)]) == 1
     assert capsys.readouterr().err.startswith("error: there is no file")
+
+
+def test_a_torn_line_is_left_out(tmp_path: Path) -> None:
+    path, torn = tmp_path / "log.jsonl", json.dumps(a_look(3_000_000, 4.0))[:60]
+    path.write_text(f"{LOG}\n{torn}")
+    assert read(path.read_text()) == read(LOG)
+    assert last_evaluated(path) == 2_000_000
+    # The training is resumed. Earlier versions wrote on in the torn line.
+    with written(path, append=True):
+        log_setup("ppo", {}, 1, pb.RuleSet(), "test")
+        log_evaluations(Progress(decisions=3_000_000), [], {})
+    events = [entry["event"] for entry in entries(path.read_text())]
+    assert events == ["setup", "update", "evaluation", "evaluation", "setup", "evaluation"]
+    assert last_evaluated(path) == 3_000_000
+    path.write_text(f"{LOG}\n{torn}{json.dumps({'event': 'setup'})}")
+    assert last_evaluated(path) == 2_000_000
 
 
 def a_run(seed: int, points: float, **plan: object) -> str:

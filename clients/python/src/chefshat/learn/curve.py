@@ -5,7 +5,6 @@ horizontal lines: they play the same games.
 """
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +20,7 @@ from chefshat.learn import plots
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.figures import Figure, Level, Line, Panel
 from chefshat.learn.runs import EVALUATION_SEED
-from chefshat.learn.training_log import ITSELF
+from chefshat.learn.training_log import ITSELF, entries
 
 ORIGIN = "`python -m chefshat.learn ppo` writes one next to its network, as .jsonl, and so does `deep-q` of chefshat-paper"
 # Half the width of a 95% interval of the normal distribution, in standard deviations.
@@ -53,11 +52,10 @@ class Run:
 
 
 def read(log: str) -> Run:
-    """Reads a log, JSON lines. Raises ValueError if this is not a log, or if it has no evaluation."""
-    try:
-        lines = [dict(json.loads(line)) for line in log.splitlines()]
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"this is not a log; {ORIGIN}") from error
+    """Reads a log, JSON lines; leaves out torn ones. Raises ValueError if this is not a log, or if it has no evaluation."""
+    lines = entries(log)
+    if log and not lines:
+        raise ValueError(f"this is not a log; {ORIGIN}")
     evaluated = [line for line in lines if line.get("event") == "evaluation"]
     if not evaluated:
         raise ValueError("the log has no evaluation; did the training end before the first?")

@@ -47,6 +47,8 @@ class Progress:
 @contextlib.contextmanager
 def written(path: Path, *, append: bool) -> Iterator[None]:
     """Writes the messages of the logger `chefshat.learn` to a file."""
+    if append:
+        _end_last_line(path)
     level, handler = LOG.level, logging.FileHandler(path, "a" if append else "w", encoding="utf-8")
     LOG.addHandler(handler)
     LOG.setLevel(logging.INFO)
@@ -56,6 +58,14 @@ def written(path: Path, *, append: bool) -> Iterator[None]:
         LOG.setLevel(level)
         LOG.removeHandler(handler)
         handler.close()
+
+
+def _end_last_line(path: Path) -> None:
+    """Ends the last line of a file if it is torn, so that what is appended does not become part of it."""
+    text = path.read_bytes() if path.exists() else b""
+    if text and not text.endswith(b"\n"):
+        with path.open("ab") as file:
+            file.write(b"\n")
 
 
 def log_setup(algorithm: str, plan: Mapping[str, Any], seed: int, rules: pb.RuleSet, trained_by: str) -> None:
@@ -108,10 +118,19 @@ def evaluate_all(
     ]
 
 
+def entries(log: str) -> list[dict[str, Any]]:
+    """Returns the lines of a log. Leaves out what is no JSON object: a full disk or the end of the process tears a line."""
+    found = []
+    for line in log.splitlines():
+        with contextlib.suppress(ValueError):
+            found.append(json.loads(line))
+    return [entry for entry in found if isinstance(entry, dict)]
+
+
 def last_evaluated(log: Path) -> int | None:
     """Returns the decisions before the last evaluation of a log; None if there is none."""
-    lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
-    found = [json.loads(line) for line in lines if line.startswith('{"event": "evaluation"') and line.endswith("}")]
+    lines = entries(log.read_text(encoding="utf-8")) if log.exists() else []
+    found = [line for line in lines if line.get("event") == "evaluation"]
     return int(found[-1]["decisions"]) if found else None
 
 
