@@ -111,7 +111,7 @@ fn of_all() -> String {
         (
             "answers that have not been read",
             format!(
-                "{}; after {} the connection is closed",
+                "{}; after {} in which nothing of one is read, the connection is closed",
                 number(calls::MAX_ANSWERS),
                 seconds(STALLED_LIMIT)
             ),

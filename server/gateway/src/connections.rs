@@ -34,7 +34,7 @@ use chefshat_base::proxies::TrustedProxies;
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// File descriptors that connections leave for databases, records and everything else.
 const RESERVED_DESCRIPTORS: usize = 128;
-/// How long a client may take to read an answer.
+/// How long a client may read nothing of an answer.
 pub const STALLED_LIMIT: Duration = Duration::from_secs(30);
 /// Time between two checks of that.
 const STALLED_INTERVAL: Duration = Duration::from_secs(5);
@@ -314,7 +314,7 @@ pub struct Client {
     /// The token that it used last.
     token: Mutex<Option<TokenId>>,
     /// Answers that it has not read completely, by the number of the call, with the time at which
-    /// they were ready.
+    /// they were ready, or it read some of them.
     answers: Mutex<BTreeMap<u64, Instant>>,
     closing: AtomicBool,
     waker: AtomicWaker,
@@ -372,6 +372,13 @@ impl Client {
     /// An answer is ready, and waits until the client reads it.
     pub fn answer_ready(&self, call: u64) {
         self.answers().insert(call, Instant::now());
+    }
+
+    /// Some of an answer has been read.
+    pub fn answer_moves(&self, call: u64) {
+        if let Some(since) = self.answers().get_mut(&call) {
+            *since = Instant::now();
+        }
     }
 
     /// An answer has been read, or will never be.

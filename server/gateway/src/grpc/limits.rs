@@ -4,7 +4,7 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
+use std::task::{Context, Poll, ready};
 
 use axum::body::HttpBody;
 use bytes::Bytes;
@@ -241,7 +241,8 @@ impl Place {
                 client.answer_ready(self.number);
             }
             let place = Arc::new(self);
-            Body::new(KeptBody { body, place })
+            let rest = Bytes::new();
+            Body::new(KeptBody { body, rest, place })
         })
     }
 }
@@ -280,7 +281,11 @@ pub(crate) async fn within_share(
     Some(place.keep(answer))
 }
 
-/// Part of an answer, with the place of its call: the transport keeps it until it is sent.
+/// Most bytes of an answer that the transport takes at a time: what it sends of fewer shows that the
+/// client reads.
+const PIECE: usize = 16 * 1024;
+
+/// A piece of an answer, with the place of its call: the transport keeps it until it is sent.
 struct KeptData {
     data: Bytes,
     place: Arc<Place>,
@@ -303,8 +308,11 @@ impl AsRef<[u8]> for KeptData {
 
 impl Drop for KeptData {
     fn drop(&mut self) {
-        if let Some(unread) = &self.place.unread {
-            unread.sent(self.data.len());
+        let Place { unread, client, .. } = &*self.place;
+        match (unread, client) {
+            (Some(unread), _) => unread.sent(self.data.len()),
+            (None, Some(client)) => client.answer_moves(self.place.number),
+            (None, None) => {}
         }
     }
 }
@@ -312,6 +320,8 @@ impl Drop for KeptData {
 /// An answer, with the place of its call. Large answers are charged.
 struct KeptBody {
     body: Body,
+    /// What the transport has not taken yet of what the body had last.
+    rest: Bytes,
     place: Arc<Place>,
 }
 
@@ -323,28 +333,38 @@ impl HttpBody for KeptBody {
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let frame = std::task::ready!(Pin::new(&mut self.body).poll_frame(context));
-        let place = &self.place;
-        if place.charges_bytes
-            && let Some(Ok(frame)) = &frame
-            && let Some(data) = frame.data_ref()
-        {
+        if self.rest.is_empty() {
+            let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
+            let data = match frame.map(|frame| frame.map(Frame::into_data)) {
+                Some(Ok(Ok(data))) => data,
+                Some(Ok(Err(trailers))) => return Poll::Ready(Some(Ok(trailers))),
+                Some(Err(status)) => return Poll::Ready(Some(Err(status))),
+                None => return Poll::Ready(None),
+            };
             let cost = data.len() as u64 / BYTES_PER_CALL;
-            if cost > 0 {
-                place.limits.charge(place.key, cost);
+            if self.place.charges_bytes && cost > 0 {
+                self.place.limits.charge(self.place.key, cost);
             }
+            self.rest = data;
         }
-        Poll::Ready(
-            frame.map(|frame| Ok(frame?.map_data(|data| KeptData::bytes(data, Arc::clone(place))))),
-        )
+        let length = self.rest.len().min(PIECE);
+        let piece = self.rest.split_to(length);
+        let piece = KeptData::bytes(piece, Arc::clone(&self.place));
+        Poll::Ready(Some(Ok(Frame::data(piece))))
     }
 
     fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
+        self.rest.is_empty() && self.body.is_end_stream()
     }
 
     fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
+        let (rest, hint) = (self.rest.len() as u64, self.body.size_hint());
+        let mut size = SizeHint::new();
+        size.set_lower(hint.lower() + rest);
+        if let Some(upper) = hint.upper() {
+            size.set_upper(upper + rest);
+        }
+        size
     }
 }
 
@@ -415,6 +435,31 @@ mod tests {
         assert!(take().is_none());
         unread.pop();
         assert_eq!(take().as_deref(), Some(&b"an answer"[..]));
+    }
+
+    #[tokio::test]
+    async fn a_large_answer_is_taken_in_pieces_that_are_all_of_it() {
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let text: Bytes = (0..=u8::MAX).cycle().take(5 * PIECE / 2).collect();
+        let whole = text.clone();
+        let services = LimitsLayer::new(limits).layer(service_fn(move |_: Request<Body>| {
+            let body = http_body_util::Full::new(text.clone());
+            let body = http_body_util::BodyExt::map_err(body, |never| match never {});
+            std::future::ready(Ok::<_, Infallible>(Response::new(Body::new(body))))
+        }));
+        let request = Request::builder().uri("/").body(Body::empty());
+        let answer = tower::ServiceExt::oneshot(services, request.expect("a request"));
+        let mut body = answer.await.expect("infallible").into_body();
+        let (mut read, mut pieces) = (Vec::new(), 0);
+        while let Some(frame) = http_body_util::BodyExt::frame(&mut body).await {
+            let left = (whole.len() - read.len()) as u64;
+            let data = frame.expect("no error").into_data().expect("data");
+            read.extend(&data);
+            pieces += 1;
+            assert_eq!(body.size_hint().exact(), Some(left - data.len() as u64));
+            assert_eq!(body.is_end_stream(), read.len() == whole.len());
+        }
+        assert_eq!((read, pieces), (whole.to_vec(), 3));
     }
 
     #[tokio::test]
