@@ -2,8 +2,7 @@
 // device holds a seat.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
-import { faultOf, isPassing, wordsOf } from "../api/faults";
+import { wordsOf } from "../api/faults";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Again } from "../lobby/Again";
@@ -16,6 +15,7 @@ import { WhichOne } from "../lobby/WhichOne";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Highlights } from "../replay/Highlights";
 import type { PageProps } from "../router";
+import { askRoom } from "./asking";
 import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
 import { SeatBanner } from "./SeatBanner";
 import { Seated } from "./Seated";
@@ -34,10 +34,6 @@ export function RoomPage({ route }: PageProps<"room">) {
   return <WhichOne {...{ held, brought, decide }} words={t().lobby.moving.which} />;
 }
 
-/** Pause before a failed request is repeated: the first, and the longest, doubled each time. */
-const SHORTEST_WAIT_MS = 1_000;
-const LONGEST_WAIT_MS = 8_000;
-
 /** The room, once it is known which seat of it this device has. */
 function RoomView({ roomId }: { roomId: string }) {
   const [table, setTable] = useState<TableState | undefined>(undefined);
@@ -51,26 +47,22 @@ function RoomView({ roomId }: { roomId: string }) {
     let started: Session | undefined;
     let held: HeldSeat | null = null;
     const load = async () => {
-      for (let waitMs = SHORTEST_WAIT_MS; !left; waitMs = Math.min(2 * waitMs, LONGEST_WAIT_MS)) {
-        try {
-          const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
-          if (left || !room) return;
-          const table = tableFromRoom(room);
-          held = heldSeat(roomId);
-          started = held ? startSession(held, table) : undefined;
-          setFault("");
-          setTable(table);
-          setSession(started);
-          setHeld(held);
-          return;
-        } catch (thrown) {
-          const fault = faultOf(thrown);
+      const room = await askRoom(
+        roomId,
+        () => !left,
+        (fault) => {
           if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
           if (!left) setFault(wordsOf(fault));
-          if (!isPassing(fault)) return;
-          await new Promise((resolve) => setTimeout(resolve, Math.max(waitMs, fault.retryMs ?? 0)));
-        }
-      }
+        },
+      );
+      if (left || !room) return;
+      const table = tableFromRoom(room);
+      held = heldSeat(roomId);
+      started = held ? startSession(held, table) : undefined;
+      setFault("");
+      setTable(table);
+      setSession(started);
+      setHeld(held);
     };
     setFault("");
     void load();

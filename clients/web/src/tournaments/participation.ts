@@ -2,20 +2,12 @@
 // each of its games. Each seat becomes a table (table/acting.ts), drawn by Participation.tsx.
 
 import { batch, type Signal, signal } from "@preact/signals";
-import { CALL_LIMIT_MS, playApi, roomApi } from "../api/client";
-import { faultOf, isPassing } from "../api/faults";
+import { playApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
 import { type Attached, DetachReason, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
-import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Acting, startActing } from "../table/acting";
+import { askRoom } from "../table/asking";
 import { tableFromRoom } from "../table/model/state";
-
-/**
- * Delay before a failed request of a room is repeated: the first, and the longest, doubled each
- * time.
- */
-const SHORTEST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 16_000;
 
 /** How the participant is attached. */
 export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
@@ -47,29 +39,14 @@ export function startParticipation(ticket: string): Participation {
 
   const isPresent = () => !stopped && (presence.peek() === "coming" || presence.peek() === "here");
 
-  /**
-   * The room of a game, needed to draw its table; undefined if it is gone or the place belongs to
-   * another tab.
-   */
-  const askRoom = async (roomId: string): Promise<Room | undefined> => {
-    for (let waitMs = SHORTEST_WAIT_MS; isPresent(); waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)) {
-      try {
-        return (await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS })).room;
-      } catch (thrown) {
-        if (!isPassing(faultOf(thrown))) return undefined;
-        await new Promise((resolve) => setTimeout(resolve, waitMs));
-      }
-    }
-    return undefined;
-  };
-
   const seat = (attached: Attached): Seated => {
     const known = rooms.get(attached.roomId);
     if (known) return known;
     const seated: Seated = { ticket: attached.ticket, acting: undefined, waiting: [] };
     rooms.set(attached.roomId, seated);
     const load = async () => {
-      const room = await askRoom(attached.roomId);
+      // Needed to draw the table.
+      const room = await askRoom(attached.roomId, isPresent);
       if (!room) {
         // If the seat is announced again, the request is repeated.
         rooms.delete(attached.roomId);
