@@ -225,8 +225,8 @@ impl CallLimits {
         self.lists.take(key).await
     }
 
-    /// Admits the answer to a request that is no call and is ready, as soon as its caller has read others;
-    /// `None` if that takes too long.
+    /// Admits an answer that is ready, to a request that is no call, as soon as the caller has read enough
+    /// others; `None` if that takes too long.
     pub async fn admit_answer(&self, key: Key) -> Option<Admitted> {
         self.calls.charge(key, 1);
         let kept = match self.answers.try_take(key) {

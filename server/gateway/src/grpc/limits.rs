@@ -413,12 +413,8 @@ mod tests {
     async fn the_place_of_an_answer_is_free_when_its_last_byte_has_been_sent() {
         let limits = Arc::new(CallLimits::new(Shares::default()));
         let answer = |_: Request<Body>| async {
-            let text = http_body_util::Full::new(Bytes::from_static(b"an answer"));
-            let body = Body::new(http_body_util::BodyExt::map_err(
-                text,
-                |never| match never {},
-            ));
-            Ok::<_, Infallible>(Response::new(body))
+            let body = axum::body::Body::from("an answer");
+            Ok::<_, Infallible>(Response::new(Body::new(body)))
         };
         let mut services = LimitsLayer::new(limits).layer(service_fn(answer));
         // The transport takes an answer and lets go of its body, whether or not the client reads.
@@ -443,8 +439,7 @@ mod tests {
         let text: Bytes = (0..=u8::MAX).cycle().take(5 * PIECE / 2).collect();
         let whole = text.clone();
         let services = LimitsLayer::new(limits).layer(service_fn(move |_: Request<Body>| {
-            let body = http_body_util::Full::new(text.clone());
-            let body = http_body_util::BodyExt::map_err(body, |never| match never {});
+            let body = axum::body::Body::from(text.clone());
             std::future::ready(Ok::<_, Infallible>(Response::new(Body::new(body))))
         }));
         let request = Request::builder().uri("/").body(Body::empty());

@@ -85,8 +85,7 @@ impl Lookup {
         caller: Key,
     ) -> Result<Option<Arc<TournamentHandle>>, Status> {
         let found_by = found_by.into();
-        let runs = |it: &Arc<TournamentHandle>| it.is_over() || !it.is_stopped();
-        if let Some(handle) = self.tournament_in_memory(&found_by).filter(runs) {
+        if let Some(handle) = self.tournament_in_memory(&found_by).filter(answers) {
             return Ok(Some(handle));
         }
         let is_known = || self.room_in_memory(&found_by).is_some();
@@ -267,7 +266,7 @@ impl Lookup {
     /// Whether the room or tournament of a ticket is in memory and runs, so that finding it takes no
     /// time.
     pub(super) fn has_in_memory(&self, id: UnitId) -> bool {
-        (self.tournaments.by_unit(id)).is_some_and(|it| it.is_over() || !it.is_stopped())
+        (self.tournaments.by_unit(id)).is_some_and(|it| answers(&it))
             || self.rooms.by_unit(id).is_some_and(|room| !room.is_gone())
     }
 
@@ -531,6 +530,11 @@ impl Lookup {
             .max(by_tournament.unwrap_or(Relation::Stranger))
             .max(by_study.unwrap_or(Relation::Stranger))
     }
+}
+
+/// Whether a tournament in memory answers calls: it runs here, or is over.
+fn answers(tournament: &Arc<TournamentHandle>) -> bool {
+    tournament.is_over() || !tournament.is_stopped()
 }
 
 /// Whether a caller shows the owner token of a tournament or a study, which stands for that of each

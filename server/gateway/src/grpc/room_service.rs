@@ -271,7 +271,7 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
-        // Nor does who waits for a room that waits for its commit.
+        // Who waits for a room that waits for its commit holds up no other calls.
         make_way(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {

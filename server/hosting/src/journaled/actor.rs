@@ -34,7 +34,7 @@ pub(super) async fn run<U: Journaled>(
     if let Err(error) = run_on(&mut unit, &mut inbox, stop).await {
         fail(&mut unit, &error);
     }
-    // Whoever sends more learns that the task has ended; whoever has sent something, here.
+    // Nothing can be sent any more, and what was sent before is given up.
     inbox.close();
     while let Ok(message) = inbox.try_recv() {
         unit.abandon(message);

@@ -194,16 +194,16 @@ impl Reader {
     /// Lets a command wait if its seat waits to be attached, and has space for it. Returns whether it
     /// does.
     pub(super) fn hold_back(&mut self, command: &mut v1::SeatCommand, arrived: Instant) -> bool {
-        let waiting = self.waiting.clone();
-        let Some(held_back) = self.held_back(command.handle) else {
-            return false;
-        };
-        if held_back.len() == MAX_COMMANDS_CONTESTED {
+        let has_space =
+            (self.held_back(command.handle)).is_some_and(|it| it.len() < MAX_COMMANDS_CONTESTED);
+        if !has_space {
             return false;
         }
-        let held = waiting.hold(&mut command.command, arrived);
+        let held = self.waiting.hold(&mut command.command, arrived);
         let is_held = held.is_some();
-        held_back.extend(held);
+        if let Some(held_back) = self.held_back(command.handle) {
+            held_back.extend(held);
+        }
         is_held
     }
 
