@@ -263,7 +263,7 @@ def test_closing_the_client_ends_a_game_of_asyncio_with_an_error(fake: FakeServe
         playing = asyncio.create_task(client.play(agent, ticket))
         await agent.asked.wait()
         await client.close()
-        await playing
+        await asyncio.wait_for(playing, 60)
 
     with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
         asyncio.run(run())

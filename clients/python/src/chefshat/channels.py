@@ -144,6 +144,7 @@ class _Calling:
         self._metadata = metadata
         self._timeout = timeout
         self._closed = False
+        self._begun: weakref.WeakSet[grpc.aio.Call] = weakref.WeakSet()
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the channel has.
         return getattr(self._channel, name)
@@ -151,6 +152,9 @@ class _Calling:
     def close(self, *arguments: Any) -> object:  # noqa: ANN401 - The channel's own.
         """Closes the channel. Further calls raise `ChefsHatError`."""
         self._closed = True
+        # Older versions of gRPC leave alone a stream of asyncio that waits for its next message: it would wait for ever.
+        for call in list(self._begun):
+            call.cancel()
         return self._channel.close(*arguments)
 
     def unary_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
@@ -176,6 +180,8 @@ class _Calling:
                 if self._closed:
                     raise closed() from None
                 raise
+            if isinstance(begun, grpc.aio.Call):
+                self._begun.add(begun)
             return _Stream(begun) if isinstance(begun, Iterator) else begun
 
         return call
