@@ -79,11 +79,29 @@ pub(crate) struct Captured {
     pub(crate) result: Result<(), Failure>,
 }
 
-/// Runs a command under the shell's `time`: on a busy machine, processor time says more about a step
-/// than the time on a clock.
+/// Under the shell's `time`: on a busy machine, processor time says more about a step than the time
+/// on a clock. What hangs is ended, with what it started, so that the run ends and names it.
+const TIMED: &str = r#"
+limit=$1
+shift
+if command -v timeout > /dev/null; then set -- timeout --kill-after=60 "$limit" "$@"; fi
+TIMEFORMAT=$'\n%U %S'; time "$@"
+"#;
+
+/// What `timeout` exits with.
+const HUNG: i32 = 124;
+
+/// The longest time of a command, on the busiest machine.
+const LIMIT: Duration = Duration::from_mins(40);
+
+/// Runs a command until it ends.
 pub(crate) fn run_captured(command: &Command) -> Captured {
+    captured_within(command, LIMIT)
+}
+
+fn captured_within(command: &Command, limit: Duration) -> Captured {
     let mut shell = Command::new("bash");
-    shell.args(["-c", "TIMEFORMAT=$'\\n%U %S'; time \"$@\"", "bash"]);
+    shell.args(["-c", TIMED, "bash", &limit.as_secs().to_string()]);
     shell.env("LC_NUMERIC", "C").env_remove("LC_ALL");
     shell.arg(command.get_program()).args(command.get_args());
     for (name, value) in command.get_envs() {
@@ -108,9 +126,14 @@ pub(crate) fn run_captured(command: &Command) -> Captured {
     let errors = String::from_utf8_lossy(&output.stderr);
     let (errors, computed) = without_times(errors.trim_end());
     let printed = format!("{}{errors}", String::from_utf8_lossy(&output.stdout));
-    let result = match output.status.success() {
-        true => Ok(()),
-        false => Err(Failure::new(format!(
+    let result = match output.status.code() {
+        Some(0) => Ok(()),
+        Some(HUNG) => Err(Failure::new(format!(
+            "`{}` has not ended in {} s",
+            line(command),
+            limit.as_secs()
+        ))),
+        _ => Err(Failure::new(format!(
             "`{}`: {}",
             line(command),
             output.status
@@ -208,6 +231,9 @@ mod tests {
             let errors = format!("wrong\n{last}");
             assert_eq!(without_times(&errors), (&*errors, Duration::ZERO), "{last}");
         }
+        let hung = captured_within(Command::new("sleep").arg("600"), Duration::from_secs(1));
+        let failure = hung.result.unwrap_err().to_string();
+        assert_eq!(failure, "`sleep 600` has not ended in 1 s");
         let missing = run_captured(&Command::new("no-such-program"));
         assert!(missing.result.is_err() && missing.printed.contains("no-such-program"));
     }
