@@ -224,6 +224,6 @@ impl TableCommand {
             )
             .into());
         }
-        offline::reference(&task, &entrant)
+        offline::reference(&task, &entrant, results)
     }
 }

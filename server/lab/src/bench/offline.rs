@@ -90,8 +90,18 @@ pub(super) fn result(
     Ok(TaskResult::of(task, agent, &games))
 }
 
-/// The result of a built-in agent with which others are compared.
-pub(super) fn reference(task: &Task, entrant: &Entrant) -> Result<TaskResult, CommandError> {
+/// The result of a built-in agent with which those of the task are compared, of as many deals as one
+/// of them has.
+pub(super) fn reference(
+    task: &Task,
+    entrant: &Entrant,
+    results: &[TaskResult],
+) -> Result<TaskResult, CommandError> {
     check_fits(task, entrant)?;
-    result(task, entrant, task.deals)
+    let same = (&*task.name, &task.deals_commitment());
+    let compared = results
+        .iter()
+        .filter(|it| (&*it.task, &it.deals_commitment) == same);
+    let deals = compared.map(|it| it.by_deal.len()).max();
+    result(task, entrant, deals.unwrap_or(task.deals))
 }

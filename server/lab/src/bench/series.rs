@@ -193,7 +193,7 @@ impl Series {
         if results.is_empty() {
             return Err("no agent has two games".into());
         }
-        let versus = offline::reference(task, &Entrant::of(report::VERSUS)?)?;
+        let versus = offline::reference(task, &Entrant::of(report::VERSUS)?, &results)?;
         let printed = report::print_table(&results, &[versus], self.json)?;
         Ok(if failed { ExitCode::FAILURE } else { printed })
     }
