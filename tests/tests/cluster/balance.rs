@@ -23,7 +23,7 @@ async fn rooms_go_to_the_nodes_with_space() {
     })
     .await;
     cluster.stop(2).await;
-    let kinds = rooms(PLAYING, 2, 3_600_000, Duration::from_millis(20));
+    let kinds = rooms(PLAYING, 2, 3_600_000, Duration::from_millis(80));
     let playing = BusyRooms::start(&cluster.url(), kinds);
     all_play(&playing).await;
     let client = cluster.nodes[0].client().await;

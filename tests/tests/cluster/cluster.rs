@@ -23,7 +23,8 @@ use crate::proxy::Proxy;
 /// The port on which nodes listen for others, each on an address of its own.
 const PEER_PORT: u16 = 50_052;
 /// Time between two looks at the database.
-const LOOK_AGAIN: Duration = Duration::from_millis(50);
+/// Each look starts a `psql`.
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 /// How much of the log of a node is shown when a test fails, bytes.
 const SHOWN: usize = 20_000;
 
@@ -302,8 +303,14 @@ impl Cluster {
 
     /// How many rooms that are not over each node owns.
     pub(crate) fn rooms_of_nodes(&self) -> Vec<usize> {
-        let nodes = 0..self.nodes.len();
-        nodes.map(|node| self.games_of(node).len()).collect()
+        let owners = self.select(
+            "SELECT peer_endpoint FROM owned JOIN nodes USING (node) WHERE NOT over AND game_id IS NOT NULL",
+        );
+        let owned = |node: &Node| {
+            let endpoint = node.peers.address.to_string();
+            owners.lines().filter(|owner| *owner == endpoint).count()
+        };
+        self.nodes.iter().map(owned).collect()
     }
 
     /// Waits until the numbers of rooms that nodes own differ by less than this part of the largest.

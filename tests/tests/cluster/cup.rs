@@ -22,7 +22,7 @@ const TABLES: u32 = PARTICIPANTS / 4;
 /// Games that are over when the owner is killed.
 const KILLED_AT: [u32; 2] = [10, 35];
 /// Time between two looks at the tournament.
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
+const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 fn options() -> PlayOptions {
     PlayOptions {

@@ -22,7 +22,7 @@ const CUT: Duration = Duration::from_secs(20);
 const RECALL_TIME_MS: u64 = 60_000;
 /// Decisions of a client before it goes.
 const BEFORE: usize = 3;
-const LOOK_AGAIN: Duration = Duration::from_millis(50);
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_cut_between_two_nodes_costs_nobody_a_decision() {
@@ -51,7 +51,7 @@ async fn a_cut_between_two_nodes_costs_nobody_a_decision() {
 #[tokio::test(flavor = "multi_thread")]
 async fn clients_come_to_nodes_that_reach_their_rooms() {
     let cluster = Cluster::start(3, Leases::Steady).await;
-    let kinds = rooms(BALANCED_ROOMS, 1, 3_600_000, Duration::from_millis(50));
+    let kinds = rooms(BALANCED_ROOMS, 1, 3_600_000, Duration::from_millis(150));
     let rooms = BusyRooms::start(&cluster.url(), kinds);
     all_play(&rooms).await;
     cluster.separate(0, 1);

@@ -12,7 +12,7 @@ const NODES: usize = 3;
 const ROOMS: usize = 12;
 /// How long what is committed is on its way to the standby: what is acknowledged earlier is lost.
 const WAY: Duration = Duration::from_millis(100);
-const LOOK_AGAIN: Duration = Duration::from_millis(50);
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 /// A cluster whose rooms play, the standby of its database, and the way to that standby.
 async fn playing() -> (Cluster, BusyRooms, Postgres, Link) {
