@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chefshat import pb
-from chefshat.learn import curve, network, runs
+from chefshat.learn import curve, network, runs, training_log
 from chefshat.learn.__main__ import main as ppo_main
+from chefshat.learn.evaluation import Evaluation
 from waiting import LIMIT_S, wait_until
 
 from chefshat_paper.learn import checkpoint, deep_q, deep_q_command
@@ -114,6 +115,42 @@ def test_its_log_is_like_that_of_ppo(place: Place, tmp_path: Path, capsys: pytes
     assert [line["decisions"] for line in curve.read(deep_q_log.read_text()).evaluations] == [0, 20, 40, 60]
     assert main([*command, "--resume"]) == 1
     assert "has taken 60 decisions already: give more than that with --decisions" in json.loads(capsys.readouterr().out)["message"]
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("evaluation", range(5))
+@pytest.mark.parametrize("is_logged", [False, True])
+def test_a_training_that_was_killed_at_an_evaluation_has_each_of_them_once(
+    place: Place, evaluation: int, is_logged: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = place.arguments(1, "--mask", "--save-every", "1000", "--evaluations", "4", "--evaluation-games", "1")
+    command[command.index("--shifts")] = "--decisions"
+    command[command.index("1")] = "40"
+    evaluate, evaluated = deep_q_command._Running.evaluate, []
+
+    def killed(running: deep_q_command._Running, agents: deep_q.Agents) -> list[Evaluation]:
+        evaluated.append(running.decisions)
+        if len(evaluated) <= evaluation:
+            return evaluate(running, agents)
+        if is_logged:
+            evaluate(running, agents)
+        raise SystemExit
+
+    with monkeypatch.context() as patched:
+        patched.setattr(deep_q_command._Running, "evaluate", killed)
+        with pytest.raises(SystemExit):
+            main(command)
+    assert evaluated == [0, 10, 20, 30, 40][: evaluation + 1]
+    # The checkpoint may be newer than the network.
+    place.out.unlink()
+    is_finished = evaluation == 4 and is_logged
+    capsys.readouterr()
+    assert main([*command, "--resume"]) == (1 if is_finished else 0)
+    log = place.out.with_suffix(".jsonl").read_text()
+    assert [line["decisions"] for line in training_log.entries(log) if line["event"] == "evaluation"] == [0, 10, 20, 30, 40]
+    assert [line["decisions"] for line in curve.read(log).evaluations] == [0, 10, 20, 30, 40]
+    assert ("has taken 40 decisions already" in capsys.readouterr().err) == is_finished
+    assert place.out.exists() != is_finished
 
 
 @pytest.fixture(scope="module")

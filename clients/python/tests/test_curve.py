@@ -172,6 +172,10 @@ def test_evaluations_of_a_resumed_training_count_once() -> None:
         (2_001_000, 3.0),
     ]
     assert [line["decisions"] for line in read("\n".join([setup, first, stopped])).evaluations] == [0, 5]
+    # The checkpoint was written before some of the evaluations, and other games followed.
+    looks = [json.dumps(a_look(decisions, 1.0)) for decisions in (0, 10, 20, 30, 12, 22, 32)]
+    resumed = read("\n".join([setup, *looks[:4], setup, *looks[4:]]))
+    assert [line["decisions"] for line in resumed.evaluations] == [0, 10, 12, 22, 32]
 
 
 def test_interquartile_means() -> None:

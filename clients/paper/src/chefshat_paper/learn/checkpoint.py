@@ -40,6 +40,7 @@ class Training:
         seed: the seed.
         shifts: Shifts played so far.
         progress: what else is counted. Files of earlier versions do not say, and so count from 0.
+        evaluation_due: whether the file was written for an evaluation, which the log has if it succeeded.
     """
 
     config: DeepQConfig
@@ -51,6 +52,7 @@ class Training:
     seed: int = 0
     shifts: int = 0
     progress: Progress = field(default_factory=Progress)
+    evaluation_due: bool = False
 
     def networks(self, name: str) -> list[Network]:
         """Returns the network of every agent, all with one name. Its outputs are those of `deep_q.outputs`, before the tanh."""
@@ -83,6 +85,7 @@ def save(path: str | os.PathLike[str], training: Training) -> None:
         "seed": str(training.seed),
         "shifts": str(training.shifts),
         "progress": json.dumps(dataclasses.asdict(training.progress)),
+        "evaluation_due": json.dumps(training.evaluation_due),
     }
     training_file.save(path, FORMAT, training.agents, training.rules, texts)
 
@@ -106,6 +109,7 @@ def load(path: str | os.PathLike[str]) -> Training:
             int(texts["seed"]),
             int(texts["shifts"]),
             Progress(**json.loads(texts.get("progress", "{}"))),
+            bool(json.loads(texts.get("evaluation_due", "false"))),
         )
 
 

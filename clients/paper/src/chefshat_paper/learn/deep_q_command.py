@@ -1,8 +1,8 @@
 """The command `python -m chefshat_paper.learn deep-q`: trains one Deep Q agent against three built-in ones.
 
 Writes three files: the network, which `play` and the server's agents can use, and a checkpoint to resume from, both every
-`--save-every` Shifts, at the end, and on Ctrl-C; and a log with the evaluations, like that of `ppo`. The agent is in `deep_q`, its
-games are in `deep_q_training`.
+`--save-every` Shifts, before each evaluation, and on Ctrl-C; and a log with the evaluations, like that of `ppo`. The agent is in
+`deep_q`, its games are in `deep_q_training`.
 """
 
 import argparse
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         return runs.INTERRUPTED
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
-    summary = _summary(played)
+    summary = {} if played is None else _summary(played)
     if options.json:
         more = training_log.summary(training.progress, evaluations)
         print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **summary, **more}))
@@ -75,9 +75,17 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Training, Played, list[Evaluation]]:
-    """Trains until the budget is used up, and writes the files. Raises `Stopped` on Ctrl-C."""
-    before = _resumed(options, state) if options.resume else None
+def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Training, Played | None, list[Evaluation]]:
+    """Trains until the budget is used up, and writes the files. Raises `Stopped` on Ctrl-C.
+
+    Returns the training, its games since it was started or resumed (None: there were none left to play), and its last evaluations.
+    """
+    before = _resumed(options, state, log) if options.resume else None
+    if before is not None and (finished := _Running(options, state, before)).done >= 1:
+        with training_log.written(log, append=True):
+            # The process may have ended between the two files.
+            finished.write(before.agents)
+            return before, None, finished.evaluate(before.agents)
     parameters = _parameters(options)
     rules, opponents, rewards, seed = options.rules, options.opponents, options.rewards, options.seed
     if before is not None:
@@ -116,7 +124,8 @@ def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Trainin
         if before is None:
             inputs, outputs = features.classic_width(env.faces, env.hand_size), env.turn_actions
             config = DeepQConfig(inputs=inputs, outputs=outputs, **parameters)
-            before = Training(config, deep_q.start(config, [seed]), rules, "", opponents, rewards, seed)
+            agents = deep_q.start(config, [seed])
+            before = Training(config, agents, rules, "", opponents, rewards, seed, evaluation_due=True)
         begun = dataclasses.replace(
             before,
             trained_by=runs.trained_by(before.trained_by, options.trained_by),
@@ -125,7 +134,7 @@ def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Trainin
         plan = {"opponents": opponents, "rewards": rewards, "evaluation_games": options.evaluation_games}
         plan |= {"evaluations": options.evaluations, "hyper": dataclasses.asdict(begun.config)}
         training_log.log_setup("deep-q", plan, seed, rules, begun.trained_by)
-        running = _Running(options, state, begun, evaluated=training_log.last_evaluated(log) is not None)
+        running = _Running(options, state, begun)
 
         def on_decision(agents: Agents, decisions: int) -> bool:
             running.decisions = begun.progress.decisions + decisions
@@ -150,8 +159,7 @@ class _Running:
         decisions: decisions taken so far, as `Progress` counts them.
     """
 
-    def __init__(self, options: argparse.Namespace, state: Path, begun: Training, *, evaluated: bool) -> None:
-        """Begins to count. `evaluated`: whether the log has an evaluation."""
+    def __init__(self, options: argparse.Namespace, state: Path, begun: Training) -> None:
         self.shifts = begun.shifts
         self.decisions = begun.progress.decisions
         self._options = options
@@ -160,8 +168,7 @@ class _Running:
         self._begun = begun
         self._began = time.monotonic()
         self._written = begun.shifts
-        # What was due before the checkpoint was written is in the log.
-        self._next_evaluation = training_log.next_evaluation(self.done, options.evaluations) if evaluated else self.done
+        self._next_evaluation = self.done if begun.evaluation_due else training_log.next_evaluation(self.done, options.evaluations)
 
     @property
     def done(self) -> float:
@@ -174,8 +181,10 @@ class _Running:
         self.shifts += shifts
 
     def do_due(self, agents: Agents) -> None:
-        """Evaluates the network, then writes the files, each if it is time."""
+        """Evaluates the network and writes the files, each if it is time."""
         if self.done >= self._next_evaluation:
+            # First the files: a training that ends during the evaluation, or after it, resumes from here.
+            self.write(agents)
             self._next_evaluation = training_log.next_evaluation(self.done, self._options.evaluations)
             self.evaluate(agents)
         if self.shifts - self._written >= self._options.save_every:
@@ -186,7 +195,8 @@ class _Running:
         before = self._begun.progress
         seconds = before.seconds + time.monotonic() - self._began
         progress = Progress(int(agents.updates[0]), self.decisions, seconds, before.runs)
-        return dataclasses.replace(self._begun, agents=agents, shifts=self.shifts, progress=progress)
+        is_due = self.done >= self._next_evaluation
+        return dataclasses.replace(self._begun, agents=agents, shifts=self.shifts, progress=progress, evaluation_due=is_due)
 
     def evaluate(self, agents: Agents) -> list[Evaluation]:
         """Plays against the built-in agents, and logs the results."""
@@ -206,9 +216,12 @@ class _Running:
         self._written = self.shifts
 
 
-def _resumed(options: argparse.Namespace, state: Path) -> Training:
-    """Loads the training to resume. Raises ValueError if the options contradict it."""
+def _resumed(options: argparse.Namespace, state: Path, log: Path) -> Training:
+    """Loads the training to resume. Its evaluation is due if the log lacks it. Raises ValueError if the options contradict it."""
     before = checkpoint.load(runs.existing(state))
+    evaluated = training_log.last_evaluated(log)
+    is_missing = before.evaluation_due and evaluated != before.progress.decisions
+    before = dataclasses.replace(before, evaluation_due=is_missing or evaluated is None)
     config = before.config
     fixed = {"opponents": before.opponents, "rewards": before.rewards, "seed": before.seed, "mask": config.mask}
     runs.refuse_contradictions(options.given, fixed)
@@ -223,7 +236,7 @@ def _resumed(options: argparse.Namespace, state: Path) -> Training:
         before.rules.ClearField("target_shifts")
         before.rules.target_points = asked_rules.target_points
     done, budget = (before.progress.decisions, "decisions") if options.decisions else (before.shifts, "shifts")
-    if done >= getattr(options, budget):
+    if done >= getattr(options, budget) and not is_missing:
         what = f"taken {done:,} decisions" if options.decisions else f"played {done:,} Shifts"
         raise ValueError(f"the training has {what} already: give more than that with --{budget}")
     return before

@@ -35,7 +35,8 @@ class Run:
         algorithm: what has learned.
         plan: its settings by name, with those of its rules, without the seed.
         seed: its seed; None if the log does not say.
-        evaluations: the lines of its evaluations, in order. Those of an interruption are left out if the training was resumed.
+        evaluations: the lines of its evaluations, by ascending decisions. If the training was resumed, those of an interruption and
+            those that were made again are left out.
         rules: the rule set; None if the log does not say.
     """
 
@@ -66,9 +67,14 @@ def read(log: str) -> Run:
         plan.pop("coalition", None)
     hyper = plan.pop("hyper", {})
     settings = {**plan, **hyper, **{f"rules {name}": value for name, value in (rules or {}).items()}}
-    # A training that was resumed may have evaluated twice at the same place.
-    due = [line for line in evaluated if line is evaluated[-1] or not line.get("stopped")]
-    evaluations = list({line["decisions"]: line for line in due}.values())
+    evaluations: list[Mapping[str, Any]] = []
+    for line in evaluated:
+        if line.get("stopped") and line is not evaluated[-1]:
+            continue
+        # A resumed training may have evaluated again what was evaluated after its checkpoint was written.
+        while evaluations and evaluations[-1]["decisions"] >= line["decisions"]:
+            evaluations.pop()
+        evaluations.append(line)
     # Logs of earlier versions do not name the algorithm, and are of `ppo`.
     algorithm = setup.get("algorithm", "ppo")
     known = json_format.ParseDict(rules, pb.RuleSet(), ignore_unknown_fields=True) if rules else None
