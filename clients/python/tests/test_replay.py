@@ -98,6 +98,12 @@ def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
         replay.from_dataset(tmp_path, agents=["Ada", "Bob"])
 
 
+def test_games_are_numbered_in_the_order_of_the_dataset(tmp_path: Path) -> None:
+    made = replay.from_dataset(dataset(tmp_path, *[{"game_id": game, "action": ord(game)} for game in "cabcda"]))
+    assert made.games.tolist() == [0, 0, 1, 1, 2, 3]
+    assert bytes(made.actions.tolist()) == b"ccaabd"
+
+
 def test_datasets_of_earlier_versions_do_not_say_who_played_the_board(tmp_path: Path) -> None:
     board = {"board_face": 9, "board_size": 2}
     rows: list[dict[str, Any]] = [{**board, "board_owner": 3}, {"board_owner": None}, {**board, "board_owner": 0}]

@@ -159,7 +159,9 @@ def _sizes(table: Decisions) -> Sizes:
 
 def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequence[str] | None) -> _Steps:
     """Pairs each decision with the next of the same seat in the same episode."""
-    games = np.unique(table.texts("game_id"), return_inverse=True)[1]
+    _, first_rows, by_id = np.unique(table.texts("game_id"), return_index=True, return_inverse=True)
+    # Ids are hashes: numbers in the order of their first rows are those of the games in the dataset.
+    games = np.argsort(np.argsort(first_rows))[by_id]
     seats = table.numbers("seat", np.intp)
     shifts = table.numbers("shift", np.int64)
     known = table.packed("mask", _sizes(table).mask_bytes)[1]
