@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -102,6 +103,26 @@ def test_games_are_numbered_in_the_order_of_the_dataset(tmp_path: Path) -> None:
     made = replay.from_dataset(dataset(tmp_path, *[{"game_id": game, "action": ord(game)} for game in "cabcda"]))
     assert made.games.tolist() == [0, 0, 1, 1, 2, 3]
     assert bytes(made.actions.tolist()) == b"ccaabd"
+
+
+def test_texts_that_repeat_take_no_memory(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    row = {**ROW, "mask": bytes.fromhex(ROW["mask"]), "gave": [0] * 12, "received": [0] * 12, "rules": f"{RULES:300}"}
+    rows = [{**row, "game_id": f"{number // 400:032}", "number": number} for number in range(5_000)]
+    rows[7]["agent"] = None
+    schema = pyarrow.Table.from_pylist([{**row, "invalid_attempts": [1]}]).schema
+    parquet.write_table(pyarrow.Table.from_pylist(rows, schema), tmp_path / "decisions.parquet", row_group_size=3_000)
+    tracemalloc.start()
+    made = replay.from_dataset(tmp_path, rewards="winning")
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(made) == 5_000
+    assert made.games.tolist() == [number // 400 for number in range(5_000)]
+    assert most < 1000 * len(made)
+    assert len(replay.from_dataset(tmp_path, agents=["Ada"])) == 4_999
+    with pytest.raises(ValueError, match="called 'Bob'; they are , Ada"):
+        replay.from_dataset(tmp_path, agents=["Bob"])
 
 
 def test_datasets_of_earlier_versions_do_not_say_who_played_the_board(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def from_dataset(
     _check_agents(table, agents)
     sizes = _sizes(table)
     scheme = rewards if isinstance(rewards, str) else ""
-    steps = _steps(table, by_game=episode == "game", turns_only=decisions == "turns", agents=agents)
+    steps = _steps(table, sizes, by_game=episode == "game", turns_only=decisions == "turns", agents=agents)
     columns = _columns(table, sizes, steps, scheme, by_game=episode == "game")
     if invalid_attempts:
         columns = _with_attempts(table, steps, scheme, columns)
@@ -137,7 +137,7 @@ class _Steps(NamedTuple):
 
 def _check_agents(table: Decisions, agents: Sequence[str] | None) -> None:
     """Refuses names of no player: a typo would silently give no transitions."""
-    playing = np.unique(table.texts("agent")).tolist()
+    playing = sorted(table.coded("agent")[0]) if agents else []
     for name in agents or ():
         if name not in playing:
             raise ValueError(f"agents: no player of these games is called {name!r}; they are {', '.join(playing[:MOST_NAMES])}")
@@ -146,7 +146,7 @@ def _check_agents(table: Decisions, agents: Sequence[str] | None) -> None:
 def _sizes(table: Decisions) -> Sizes:
     """Returns the sizes of all games of the table."""
     found = set()
-    for text in np.unique(table.texts("rules")).tolist():
+    for text in table.coded("rules")[0]:
         rules = json.loads(text)
         found.add((int(rules["players"]), int(rules["faces"]), int(rules.get("jokers", 0))))
     if len(found) != 1:
@@ -157,17 +157,17 @@ def _sizes(table: Decisions) -> Sizes:
     return Sizes(players, faces, jokers, hand_size, features.num_actions(faces), features.turn_actions(faces))
 
 
-def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequence[str] | None) -> _Steps:
+def _steps(table: Decisions, sizes: Sizes, *, by_game: bool, turns_only: bool, agents: Sequence[str] | None) -> _Steps:
     """Pairs each decision with the next of the same seat in the same episode."""
-    _, first_rows, by_id = np.unique(table.texts("game_id"), return_index=True, return_inverse=True)
-    # Ids are hashes: numbers in the order of their first rows are those of the games in the dataset.
-    games = np.argsort(np.argsort(first_rows))[by_id]
+    _, first_rows, by_code = np.unique(table.coded("game_id")[1], return_index=True, return_inverse=True)
+    # The order of the dataset is that of the first rows.
+    games = np.argsort(np.argsort(first_rows))[by_code]
     seats = table.numbers("seat", np.intp)
     shifts = table.numbers("shift", np.int64)
-    known = table.packed("mask", _sizes(table).mask_bytes)[1]
+    known = table.packed("mask", sizes.mask_bytes)[1]
     rows = np.lexsort((table.numbers("number", np.int64), seats, games))
     if turns_only:
-        rows = rows[table.texts("phase")[rows] == "turn"]
+        rows = rows[table.is_in("phase", {"turn"})[rows]]
     same = (games[rows[1:]] == games[rows[:-1]]) & (seats[rows[1:]] == seats[rows[:-1]])
     if not by_game:
         same &= shifts[rows[1:]] == shifts[rows[:-1]]
@@ -177,7 +177,7 @@ def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequenc
     ends = table.numbers("game_place" if by_game else "shift_place", np.uint8)[rows] > 0
     wanted = known[rows] & np.where(after >= 0, known[after], ends)
     if agents is not None:
-        wanted &= np.isin(table.texts("agent")[rows], list(agents))
+        wanted &= table.is_in("agent", agents)[rows]
     return _Steps(rows[wanted], after[wanted], games)
 
 
@@ -185,9 +185,10 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
     """Returns the columns of transitions, by their flat names."""
     before, after, games = steps
     ended = after < 0
+    phases, phase_codes = table.coded("phase")
     situations: dict[str, NDArray[Any]] = {
         "seats": table.numbers("seat", np.uint8),
-        "kinds": np.vectorize(_KINDS.get, otypes=[np.uint8])(table.texts("phase")),
+        "kinds": np.array([_KINDS[phase] for phase in phases], np.uint8)[phase_codes],
         "mask_bits": table.packed("mask", sizes.mask_bytes)[0],
         "shifts": table.numbers("shift", np.uint32),
         "pizzas": table.numbers("pizza", np.uint32),
@@ -240,7 +241,7 @@ def _with_attempts(table: Decisions, steps: _Steps, scheme: str, columns: dict[s
     attempts = lengths[steps.before]
     if not attempts.any():
         return columns
-    decided = (table.texts("source")[steps.before] != "invalid") | (attempts == 0)
+    decided = ~table.is_in("source", {"invalid"})[steps.before] | (attempts == 0)
     counts = attempts + decided
     # Repeats each transition for its attempts. The last one leads to the next decision, the others to the same one.
     source = np.repeat(np.arange(len(counts)), counts)

@@ -6,7 +6,7 @@ The columns are described in docs/datasets.md; `recorded` converts them to trans
 import csv
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +44,16 @@ class Decisions(ABC):
         """Returns a column of bytes of one length, (R, width), and whether each is known, (R,)."""
 
     @abstractmethod
-    def texts(self, name: str) -> NDArray[np.str_]:
-        """Returns a column of texts, (R,); null is empty."""
+    def coded(self, name: str) -> tuple[list[str], NDArray[np.intp]]:
+        """Returns the distinct texts of a column, and the index of each row's text, (R,); null is empty.
+
+        Texts repeat in many rows: an array of them would take several times as much memory as all numbers of the table.
+        """
+
+    def is_in(self, name: str, texts: Collection[str]) -> NDArray[np.bool_]:
+        """Returns whether the text of each row of a column is one of these, (R,)."""
+        distinct, codes = self.coded(name)
+        return np.array([text in texts for text in distinct], np.bool_)[codes]
 
 
 def read(path: Path) -> Decisions:
@@ -54,10 +62,13 @@ def read(path: Path) -> Decisions:
     Raises:
         FileNotFoundError: there is no table of decisions.
         ImportError: it is a Parquet file, and pyarrow is not installed.
-        ValueError: it is not a table of decisions.
+        ValueError: it is not a table of decisions, or it has no rows.
     """
     file = _file_of(path)
-    return _Arrow(file) if file.suffix == ".parquet" else _Rows(file)
+    table = _Arrow(file) if file.suffix == ".parquet" else _Rows(file)
+    if table.rows == 0:
+        raise ValueError(f"{file} has no rows; is there a game in the dataset?")
+    return table
 
 
 def _file_of(path: Path) -> Path:
@@ -83,25 +94,30 @@ def has_pyarrow() -> bool:
 
 
 class _Arrow(Decisions):
-    """A Parquet file."""
+    """A Parquet file. Each column is read when it is asked for, and not kept: most are not needed."""
 
     def __init__(self, file: Path) -> None:
         try:
-            import pyarrow.parquet
+            from pyarrow import parquet
         except ImportError as error:
             hint = "pip install pyarrow, or export with --format jsonl"
             raise ImportError(f"{file} is a Parquet file, which needs pyarrow: {hint}") from error
         self._file = file
-        self._table = pyarrow.parquet.read_table(file)
-        self.rows = self._table.num_rows
+        self._read_table = parquet.read_table
+        metadata = parquet.read_metadata(file)
+        self.rows = metadata.num_rows
+        self._names = set(metadata.schema.to_arrow_schema().names)
 
     def has(self, name: str) -> bool:
-        return name in self._table.column_names
+        return name in self._names
 
-    def _column(self, name: str) -> Any:  # noqa: ANN401 - pyarrow has no types.
+    def _chunks(self, name: str, **options: Any) -> Any:  # noqa: ANN401 - pyarrow has no types.
         if not self.has(name):
             raise _lacks(self._file, name)
-        column = self._table.column(name)
+        return self._read_table(self._file, columns=[name], **options).column(0)
+
+    def _column(self, name: str) -> Any:  # noqa: ANN401 - pyarrow has no types.
+        column = self._chunks(name)
         return column.combine_chunks() if column.num_chunks != 1 else column.chunk(0)
 
     def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
@@ -125,8 +141,11 @@ class _Arrow(Decisions):
         joined = np.frombuffer(b"".join(filter(None, column.to_pylist())), np.uint8)
         return _filled(known, joined, width, np.uint8), known
 
-    def texts(self, name: str) -> NDArray[np.str_]:
-        return np.array(self._column(name).fill_null("").to_pylist(), np.str_)
+    def coded(self, name: str) -> tuple[list[str], NDArray[np.intp]]:
+        column = self._chunks(name, read_dictionary=[name]).unify_dictionaries()
+        texts = column.chunk(0).dictionary.to_pylist()
+        codes = np.concatenate([chunk.indices.fill_null(len(texts)).to_numpy() for chunk in column.chunks])
+        return texts + [""] * (column.null_count > 0), codes.astype(np.intp)
 
 
 class _Rows(Decisions):
@@ -146,8 +165,6 @@ class _Rows(Decisions):
                 self._parse = None
                 self._cells = {name: [row[name] for row in objects] for name in (objects[0] if objects else {})}
         self.rows = len(next(iter(self._cells.values()), []))
-        if not self._cells:
-            raise ValueError(f"{file} has no rows; is there a game in the dataset?")
 
     def has(self, name: str) -> bool:
         return name in self._cells
@@ -178,8 +195,10 @@ class _Rows(Decisions):
         joined = np.frombuffer(bytes.fromhex("".join(filter(None, cells))), np.uint8)
         return _filled(known, joined, width, np.uint8), known
 
-    def texts(self, name: str) -> NDArray[np.str_]:
-        return np.array([cell or "" for cell in self._column(name, text=True)], np.str_)
+    def coded(self, name: str) -> tuple[list[str], NDArray[np.intp]]:
+        numbers: dict[str, int] = {}
+        codes = [numbers.setdefault(cell or "", len(numbers)) for cell in self._column(name, text=True)]
+        return list(numbers), np.array(codes, np.intp)
 
 
 def _filled(known: NDArray[np.bool_], items: NDArray[Any], width: int, dtype: DTypeLike) -> NDArray[Any]:
