@@ -69,6 +69,16 @@ def test_a_comparison_needs_no_luck_with_the_deals() -> None:
             compare(trained, first_legal, "greedy", deals=2, seats=seats)
 
 
+def test_games_that_are_played_again_are_not_independent() -> None:
+    one, other = bytes(32), b"x" * 32
+    for seeds in ([one], [one, other, one, other]):
+        with pytest.raises(ValueError, match=f"seed: {len(set(seeds))} different seeds for 4 deals; give one for each"):
+            compare("greedy", "trained", "greedy", deals=4, seed=seeds)
+        with pytest.raises(ValueError, match="different seeds for 3 games"):
+            evaluate("greedy", "trained", games=3, seed=seeds)
+    assert compare("greedy", "greedy", "trained", deals=2, seed=[one, other, one]).standard_error == 0
+
+
 def test_evaluations_and_comparisons_mean_the_same() -> None:
     """Games have different numbers of Shifts: the mean of the games' means would be another number."""
     rules = {"preset": "paper", "target_points": 9}

@@ -125,8 +125,10 @@ def evaluate(
             player failed; the message names it with the game and its seed.
         NetworkFileError: the file of a player is not a network.
         OSError: it cannot be read.
-        ValueError: the network was trained for games of another size, or there is no such seat.
+        ValueError: the network was trained for games of another size, there is no such seat, or seeds are fewer than the games or
+            repeated.
     """
+    _check_seeds(seed, games, "games")
     listed, wanted = _listed(opponents), _Wanted(games, seed, rules, address, parallel)
     with _bar(games * _in_rooms(player, listed)) as bar:
         played = _play(player, listed, seat, wanted, bar)
@@ -194,10 +196,11 @@ def compare(
         NetworkFileError: the file of a player is not a network.
         OSError: it cannot be read.
         ValueError: a network was trained for games of another size, there is no such seat, seats are empty or
-            repeated, or deals are fewer than two.
+            repeated, deals are fewer than two, or seeds are fewer than the deals or repeated.
     """
     if deals < 2:
         raise ValueError(f"{deals} deals: play at least 2, so that there is a standard error")
+    _check_seeds(seed, deals, "deals")
     if seats is None:
         seats = range(runs.full_rules(rules, address).players)
     if not len(seats) or len(set(seats)) < len(seats):
@@ -215,6 +218,12 @@ def compare(
                 shifts[number] += np.bincount(played.games, minlength=deals)
                 names = played.opponents
     return compared(names, points, shifts)
+
+
+def _check_seeds(seed: Seed, wanted: int, what: str) -> None:
+    """Refuses seeds that would play a game again: the standard error takes games as independent."""
+    if isinstance(seed, Sequence) and len(different := set(seed[:wanted])) < wanted:
+        raise ValueError(f"seed: {len(different):,} different seeds for {wanted:,} {what}; give one for each, or a base seed")
 
 
 class _Wanted(NamedTuple):
