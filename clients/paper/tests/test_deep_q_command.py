@@ -16,7 +16,7 @@ from chefshat.learn.__main__ import main as ppo_main
 from chefshat.learn.evaluation import Evaluation
 from waiting import LIMIT_S, wait_until
 
-from chefshat_paper.learn import checkpoint, deep_q, deep_q_command
+from chefshat_paper.learn import checkpoint, deep_q, deep_q_command, tune
 from chefshat_paper.learn.__main__ import main, parse
 from chefshat_paper.learn.deep_q import DeepQConfig
 
@@ -53,8 +53,8 @@ def test_a_training_resumes_after_ctrl_c(
     command = [sys.executable, "-m", "chefshat_paper.learn", *place.arguments(1_000_000, "--save-every", "1", "--seed", "5")]
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     processes.append(running)
-    # The network is written last, so both files exist during the training.
-    wait_until(place.out.exists, "the network is written", running)
+    # The network is written last, so both files exist during the training: first at the evaluation before it.
+    wait_until(lambda: place.out.exists() and checkpoint.load(place.state).shifts >= 1, "the network is written", running)
     during = checkpoint.load(place.state)
     running.send_signal(signal.SIGINT)
     _, message = running.communicate(timeout=LIMIT_S)
@@ -201,6 +201,29 @@ def test_contradicting_parameters_are_refused(place: Place, full_rules: pb.RuleS
     place.parameters.write_text(json.dumps({"parameters": {**SMALL, "batch_size": 8}}))
     assert main(place.arguments(5, "--resume")) == 1
     assert "batch size 4, not 8" in capsys.readouterr().err
+
+
+@pytest.mark.server
+def test_tuned_parameters_come_with_the_settings_for_which_they_were_found(
+    place: Place, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tune, "evaluate", lambda *_, **__: [0.5])
+    found = place.parameters.with_name("tuned.json")
+    searched = ["tune", "--out", str(found), "--trials", "1", "--mask", "--opponents", "greedy", "--rewards", "validity"]
+    assert main(searched) == 0
+    _, command = capsys.readouterr().out.strip().split("python -m chefshat_paper.learn ")
+    assert command == f"deep-q --parameters {found} --out FILE"
+    tuned = json.loads(found.read_text())
+    assert {name: tuned[name] for name in deep_q_command.TUNED_FOR} == {"mask": True, "opponents": "greedy", "rewards": "validity"}
+    # Smaller networks, which learn sooner.
+    place.parameters.write_text(json.dumps({**tuned, "parameters": SMALL}))
+    assert main(place.arguments(1)) == 0
+    training = checkpoint.load(place.state)
+    assert (training.config.mask, training.opponents, training.rewards) == (True, "greedy", "validity")
+    assert main(place.arguments(2, "--resume")) == 0
+    assert main(place.arguments(1, "--force", "--opponents", "random")) == 0
+    training = checkpoint.load(place.state)
+    assert (training.config.mask, training.opponents, training.rewards) == (True, "random", "validity")
 
 
 def test_a_second_training_does_not_write_the_files_of_the_first(

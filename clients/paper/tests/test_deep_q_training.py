@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chefshat.learn import network
+from chefshat.learn import network, runs
 from chefshat.vector import VectorEnv
 from test_deep_q import TINY, ids
 
-from chefshat_paper.learn import checkpoint, deep_q, deep_q_training
-from chefshat_paper.learn.__main__ import main
+from chefshat_paper.learn import checkpoint, deep_q, deep_q_training, tune
+from chefshat_paper.learn.__main__ import main, parse
 from chefshat_paper.learn.deep_q import DeepQConfig
 from chefshat_paper.learn.deep_q_training import LockStep
 
@@ -161,6 +161,21 @@ def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path
     assert checkpoint.load(tmp_path / "agent.training").config.batch_size == tuned["parameters"]["batch_size"]
 
 
+def test_trials_play_no_games_of_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
+    options = parse(["tune", "--out", "o", "--seed", "7"])
+    seeds = []
+
+    def asked(*_: object, seed: int, **__: object) -> None:
+        seeds.append(seed)
+        raise InterruptedError
+
+    monkeypatch.setattr(tune, "VectorEnv", asked)
+    for afresh in (False, True):
+        with pytest.raises(InterruptedError):
+            tune.evaluate(options, DeepQConfig(), afresh=afresh)
+    assert seeds == [7 + runs.SEED_STEP, 7 + 2 * runs.SEED_STEP]
+
+
 def test_a_missing_parameter_file_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "p.json"
     options = ["deep-q", "--out", str(tmp_path / "a"), "--parameters", str(path), "--address", "127.0.0.1:1"]
@@ -178,6 +193,6 @@ def test_results_of_a_few_shifts_are_counts(real_address: str, tmp_path: Path, c
     # With other seeds an untrained agent without a mask may take thousands of attempts.
     options = ["--shifts", "2", "--seed", "2", "--address", real_address]
     assert main(["deep-q", "--out", str(tmp_path / "a.safetensors"), *options]) == 0
-    output = capsys.readouterr().out
-    assert re.search(r"won [01] of the last 1, ", output)
-    assert "%" not in output
+    summary = capsys.readouterr().out.splitlines()[1]
+    assert re.search(r"won [01] of the last 1, ", summary)
+    assert "%" not in summary

@@ -23,7 +23,13 @@ def _deep_q(command: argparse.ArgumentParser) -> None:
     _deep_q_games(command)
     command.add_argument("--name", default="deep-q", help="name of the agent, written into the network")
     add_rules(command)
-    command.add_argument("--parameters", type=Path, metavar="FILE", help="hyper-parameters found by `tune` (default: the paper's)")
+    command.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE",
+        help="hyper-parameters found by `tune`, with its --mask, --opponents and --rewards unless they are given here "
+        "(default: the paper's)",
+    )
     command.add_argument(
         "--resume",
         action="store_true",

@@ -10,6 +10,7 @@ import dataclasses
 import json
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,9 @@ from chefshat_paper.learn import checkpoint, deep_q, deep_q_training
 from chefshat_paper.learn.checkpoint import Training
 from chefshat_paper.learn.deep_q import Agents, DeepQConfig
 from chefshat_paper.learn.deep_q_training import Played
+
+# The settings for which `tune` has found its hyper-parameters.
+TUNED_FOR = ("mask", "opponents", "rewards")
 
 
 class Stopped(Exception):
@@ -80,14 +84,15 @@ def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Trainin
 
     Returns the training, its games since it was started or resumed (None: there were none left to play), and its last evaluations.
     """
-    before = _resumed(options, state, log) if options.resume else None
+    tuned = _tuned(options)
+    before = _resumed(options, tuned, state, log) if options.resume else None
     if before is not None and (finished := _Running(options, state, before)).done >= 1:
         with training_log.written(log, append=True):
             # The process may have ended between the two files.
             finished.write(before.agents)
             return before, None, finished.evaluate(before.agents)
-    parameters = _parameters(options)
-    rules, opponents, rewards, seed = options.rules, options.opponents, options.rewards, options.seed
+    rules, seed = options.rules, options.seed
+    mask, opponents, rewards = (tuned[name] for name in TUNED_FOR)
     if before is not None:
         rules, opponents, rewards, seed = before.rules, before.opponents, before.rewards, before.seed
     address = join_options.server_if_any(options)
@@ -123,7 +128,7 @@ def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Trainin
     ):
         if before is None:
             inputs, outputs = features.classic_width(env.faces, env.hand_size), env.turn_actions
-            config = DeepQConfig(inputs=inputs, outputs=outputs, **parameters)
+            config = DeepQConfig(inputs=inputs, outputs=outputs, mask=mask, **tuned["parameters"])
             agents = deep_q.start(config, [seed])
             before = Training(config, agents, rules, "", opponents, rewards, seed, evaluation_due=True)
         begun = dataclasses.replace(
@@ -216,7 +221,7 @@ class _Running:
         self._written = self.shifts
 
 
-def _resumed(options: argparse.Namespace, state: Path, log: Path) -> Training:
+def _resumed(options: argparse.Namespace, tuned: Mapping[str, Any], state: Path, log: Path) -> Training:
     """Loads the training to resume. Its evaluation is due if the log lacks it. Raises ValueError if the options contradict it."""
     before = checkpoint.load(runs.existing(state))
     evaluated = training_log.last_evaluated(log)
@@ -226,7 +231,7 @@ def _resumed(options: argparse.Namespace, state: Path, log: Path) -> Training:
     fixed = {"opponents": before.opponents, "rewards": before.rewards, "seed": before.seed, "mask": config.mask}
     runs.refuse_contradictions(options.given, fixed)
     if "parameters" in options.given:
-        asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, **{**_parameters(options), "mask": config.mask})
+        asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, mask=config.mask, **tuned["parameters"])
         runs.refuse_contradictions(dataclasses.asdict(asked), dataclasses.asdict(config))
     asked_rules = runs.full_rules(options.rules, join_options.server_if_any(options))
     if "rules" in options.given:
@@ -242,10 +247,11 @@ def _resumed(options: argparse.Namespace, state: Path, log: Path) -> Training:
     return before
 
 
-def _parameters(options: argparse.Namespace) -> dict[str, Any]:
-    """Returns the hyper-parameters that differ from the default: those of a file, and the mask."""
+def _tuned(options: argparse.Namespace) -> dict[str, Any]:
+    """Returns the hyper-parameters and the settings of a file of `tune`; options that were given replace its settings."""
+    settings = {name: getattr(options, name) for name in TUNED_FOR}
     if options.parameters is None:
-        return {"mask": options.mask}
+        return {"parameters": {}, **settings}
     check_readable(options.parameters, "file of hyper-parameters", "`python -m chefshat_paper.learn tune` writes")
     try:
         plain = json.loads(options.parameters.read_text(encoding="utf-8"))
@@ -253,11 +259,13 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
         plain = None
     found = plain.get("parameters") if isinstance(plain, dict) else None
     known = {field.name for field in dataclasses.fields(DeepQConfig)} - {"inputs", "outputs", "mask"}
-    if not isinstance(found, dict) or not found.keys() <= known:
+    if not isinstance(plain, dict) or not isinstance(found, dict) or not found.keys() <= known:
         raise ValueError(
             f'{options.parameters} has no object "parameters" with some of {", ".join(sorted(known))}: `tune` writes such files'
         )
-    return {**found, **({"hidden": tuple(found["hidden"])} if "hidden" in found else {}), "mask": options.mask}
+    # Files of earlier versions have no settings.
+    settings |= {name: plain[name] for name in TUNED_FOR if name in plain and name not in options.given}
+    return {"parameters": {**found, **({"hidden": tuple(found["hidden"])} if "hidden" in found else {})}, **settings}
 
 
 def _summary(played: Played) -> dict[str, float]:

@@ -26,6 +26,7 @@ from tqdm import tqdm
 
 from chefshat_paper.learn import deep_q, deep_q_training
 from chefshat_paper.learn.deep_q import DeepQConfig
+from chefshat_paper.learn.deep_q_command import TUNED_FOR
 from chefshat_paper.learn.deep_q_training import Played
 
 FORMAT = "chefshat-tune-1"
@@ -112,7 +113,8 @@ def evaluate(options: argparse.Namespace, config: DeepQConfig, *, afresh: bool =
         decisions="turns",
         invalid="ask_again",
         total_games=len(seeds),
-        seed=options.seed + runs.SEED_STEP * afresh,
+        # The games of seeds below the step are for evaluations.
+        seed=options.seed + runs.SEED_STEP * (1 + afresh),
         rules={"preset": "paper", "target_shifts": options.shifts},
         shift_statistics=True,
     )
@@ -193,8 +195,9 @@ def _as_json(options: argparse.Namespace, trials: list[Trial], again: list[Trial
         "command": options.trained_by,
         "goal": goal(options),
         "best": best(trials).number,
-        # `deep-q --parameters` reads this key.
+        # `deep-q --parameters` reads these keys: the parameters are those of agents with these settings.
         "parameters": best(trials).parameters,
+        **{name: getattr(options, name) for name in TUNED_FOR},
         "trials": [dataclasses.asdict(trial) for trial in trials],
         # Empty until the last trial has ended.
         "trained_afresh": [dataclasses.asdict(trial) for trial in again],

@@ -19,7 +19,7 @@ from chefshat.vector import Rules, VectorEnv
 
 # Seeds given by users are below 2^31. Adding multiples of this gives other games.
 SEED_STEP = 2**32
-# Base seed of all evaluations; trainings use base seeds from 2^32 on.
+# Base seed of all evaluations; trainings use base seeds from 2^32 on. Only a new one of `deep-q` plays the game of its own seed.
 EVALUATION_SEED = 20_200_612
 # Maximum characters of the commands in a file. `chefshat` reads at most 16 KiB of such a text, and a character may be 4 bytes.
 MAX_TRAINED_BY = 4_000
