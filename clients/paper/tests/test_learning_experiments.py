@@ -138,7 +138,7 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     quiet = Progress(show=False)
     both = rules.networks(Config(ServerAddress(real_address), (1, 2), True, tmp_path), quiet)
     files = sorted(path.name for path in tmp_path.iterdir())
-    assert files == ["rules-seed-1.safetensors", "rules-seed-2.safetensors"]
+    assert files == ["rules-quick-seed-1.safetensors", "rules-quick-seed-2.safetensors"]
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
         again = rules.networks(Config(ServerAddress(real_address), (1, 2), True, tmp_path), quiet)
@@ -165,7 +165,13 @@ def test_networks_of_other_settings_are_learned_again(real_address: str, tmp_pat
             rules.networks(config, Progress(show=False))
         return True
 
-    assert is_learned_again(dataclasses.replace(quick, quick=False))
+    full = dataclasses.replace(quick, quick=False)
+    assert is_learned_again(full)
+    # A quick run and a full one leave the networks of each other.
+    others = deep_q.start(made, (3, 4))
+    rules._keep(full, Learned(Played({}, {}, ruleset, 0), others))
+    for config, expected in ((quick, agents), (full, others)):
+        jax.tree.map(np.testing.assert_array_equal, rules.networks(config, Progress(show=False)), expected.online)
     assert is_learned_again(dataclasses.replace(quick, seeds=(1, 3)))
     for where, name, value in (
         (learning, "QUICK_SHIFTS", learning.QUICK_SHIFTS + 1),

@@ -97,7 +97,7 @@ def networks(config: Config, progress: Progress) -> Params:
     read = []
     for seed in config.seeds:
         try:
-            saved = network.load(_file(config.out, seed))
+            saved = network.load(_file(config, seed))
         except (OSError, NetworkFileError):
             break
         if saved.info.trained_by != _trained_by(config, seed, digest):
@@ -135,11 +135,12 @@ def _keep(config: Config, learned: Learned) -> None:
     for number, seed in enumerate(config.seeds):
         training = Training(CONDITIONS[FIRST].agent, learned.agents, learned.played.rules, _trained_by(config, seed, digest))
         trained = training.networks(f"deep-q-rules-{seed}")[number]
-        network.save(_file(config.out, seed), trained.layers, trained.info)
+        network.save(_file(config, seed), trained.layers, trained.info)
 
 
-def _file(folder: Path, seed: int) -> Path:
-    return folder / f"rules-seed-{seed}.safetensors"
+def _file(config: Config, seed: int) -> Path:
+    """Returns the path of a network. Those of a quick run never replace those of a full one, which took hours."""
+    return config.out / f"rules{'-quick' if config.quick else ''}-seed-{seed}.safetensors"
 
 
 def _digest(config: Config) -> str:
