@@ -5,6 +5,7 @@ import re
 import struct
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -161,13 +162,19 @@ def test_a_results_file_survives_writing_and_reading(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "spoil", [lambda plain: plain.pop("format"), lambda plain: plain.pop("tables"), lambda plain: plain.update(more=1)]
 )
-def test_other_files_are_refused(tmp_path: Path, spoil: Callable[[dict[str, object]], object]) -> None:
+def test_other_files_are_refused(
+    tmp_path: Path, spoil: Callable[[dict[str, object]], object], capsys: pytest.CaptureFixture[str]
+) -> None:
     plain = results.as_json(a_result())
     spoil(plain)
     with pytest.raises(ValueError, match="results file"):
         results.from_json(plain)
     (tmp_path / "mechanics.json").write_text(json.dumps(plain))
     assert main(["report", str(tmp_path)]) == 1
+    (tmp_path / "mechanics.json").write_text("[]")
+    for arguments in (["report", str(tmp_path)], ["mechanics", "--quick", "--out", str(tmp_path), "--address", "127.0.0.1:1"]):
+        assert main(arguments) == 1
+        assert "not a results file" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_page_is_filled_only_between_the_marks() -> None:
@@ -192,6 +199,7 @@ def test_report_prints_and_fills_in_saved_results(tmp_path: Path, capsys: pytest
     assert main(["report", str(saved)]) == 1
     assert "no results in" in capsys.readouterr().err
     results.write(a_result(), saved / "mechanics.json")
+    (saved / "tuned.json").write_text('{"format": "chefshat-tune-1"}')
     assert main(["report", str(saved)]) == 0
     assert "28.0% (22.8\u201333.9)" in capsys.readouterr().out
     drawn = (saved / "experiments-mechanics-curves.png").read_bytes()
@@ -229,6 +237,16 @@ def test_options() -> None:
         with pytest.raises(SystemExit) as exit_info:
             parse(wrong)
         assert exit_info.value.code == 2
+
+
+@pytest.mark.parametrize("seeds", [(3,), (3, 4), (0, 1, 2, 3, 4)])
+@pytest.mark.parametrize("quick", [False, True])
+def test_the_command_of_a_result_reproduces_it(seeds: tuple[int, ...], quick: bool) -> None:
+    made = replace(a_result("rules", quick=quick), seeds=seeds)
+    _, _, module, *arguments = command._command(made).split()
+    options = parse(arguments)
+    assert module == "chefshat_paper.experiments"
+    assert (options.what, options.quick, tuple(range(options.seed, options.seed + options.seeds))) == ("rules", quick, seeds)
 
 
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
@@ -323,8 +341,8 @@ def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> Non
     assert result.figures
     assert result.rules
     assert all(rules["faces"] == 11 for rules in result.rules.values())
-    repetitions = "" if name == "mechanics" else " --seeds 2"
-    assert result.run["command"] == f"python -m chefshat_paper.experiments {name} --seed 1{repetitions} --quick"
+    seeds = 1 if name == "mechanics" else 2
+    assert result.run["command"] == f"python -m chefshat_paper.experiments {name} --seed 1 --seeds {seeds} --quick"
     assert result.run["package_version"]
     assert result.run["server_version"]
     assert result.run["commit"]

@@ -79,7 +79,8 @@ def run(options: argparse.Namespace) -> int:
 def report(options: argparse.Namespace) -> int:
     """Shows saved results and draws their plots, next to them or into a page. Returns the exit code."""
     try:
-        found = [path for path in sorted(options.folder.glob("*.json")) if path.is_file()]
+        # The folder may have other files, such as those of `tune`.
+        found = [path for name in EXPERIMENTS if (path := results_file(options.folder, name)).is_file()]
         if not found:
             command = f"python -m chefshat_paper.experiments all --out {options.folder}"
             raise Refused(f"no results in {options.folder}: run `{command}` first")
@@ -169,9 +170,9 @@ def _server(address: ServerAddress | None) -> Iterator[ServerAddress]:
 
 def _command(result: Result) -> str:
     """Returns the command that reproduces this result, without the folder and address, which do not affect it."""
-    repetitions = f" --seeds {len(result.seeds)}" if len(result.seeds) > 1 else ""
     quick = " --quick" if result.quick else ""
-    return f"python -m chefshat_paper.experiments {result.experiment} --seed {result.seeds[0]}{repetitions}{quick}"
+    seeds = f"--seed {result.seeds[0]} --seeds {len(result.seeds)}"
+    return f"python -m chefshat_paper.experiments {result.experiment} {seeds}{quick}"
 
 
 def _commit(package: Path = Path(__file__).parents[1]) -> str:

@@ -133,7 +133,7 @@ def as_json(result: Result) -> dict[str, Any]:
 
 def from_json(plain: Json) -> Result:
     """Converts JSON values to a result. Raises ValueError if they are not one."""
-    if plain.get("format") != FORMAT:
+    if not isinstance(plain, Mapping) or plain.get("format") != FORMAT:
         raise ValueError(f"not a results file of this version ({FORMAT})")
     try:
         tables = [
