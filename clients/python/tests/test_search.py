@@ -19,6 +19,7 @@ import chefshat
 from chefshat import ChefsHatError, VectorEnv, history, pb, search
 from chefshat.estimates import Estimates, Outcomes
 from chefshat.learn import network
+from chefshat.learn.evaluation import evaluate
 from chefshat.search import Position
 
 pytest.importorskip("chefshat_native")
@@ -263,6 +264,14 @@ def test_the_search_agent_beats_greedy() -> None:
     places = sample_module("search_agent").play(games=10, rollouts=1000)
     assert len(places) == 10
     assert places.count(1) >= 7
+
+
+def test_own_rollouts_count_a_shift_of_each_game(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    sample = sample_module("own_rollouts")
+    monkeypatch.setattr(sample, "search_action", lambda env, row, policy, deals: int(policy(env.batch)[row]))
+    sample.main(games=30)
+    expected = evaluate(sample.lowest, "greedy", games=30, seed=1, rules={"target_shifts": 1})
+    assert capsys.readouterr().out.startswith(f"{expected.points:.2f} points a Shift")
 
 
 def test_own_rollouts(capsys: pytest.CaptureFixture[str]) -> None:

@@ -37,9 +37,12 @@ def search_action(env: VectorEnv, row: int, policy: Callable[[Batch], NDArray[np
 
 def main(games: int = 4, deals: int = 20) -> None:
     """Plays a Shift of each game and prints the mean points."""
-    with VectorEnv(games=games, client_seats=[0], opponents="greedy", history=512, rewards="points", seed=1) as env:
+    rules = {"target_shifts": 1}
+    with VectorEnv(
+        games=games, total_games=games, client_seats=[0], opponents="greedy", rules=rules, history=512, rewards="points", seed=1
+    ) as env:
         ended: list[float] = []
-        while len(ended) < games:
+        while not env.batch.done:
             env.step([search_action(env, row, lowest, deals) for row in range(len(env.batch))])
             ended.extend(env.batch.endings.rewards.tolist())
     print(f"{np.mean(ended):.2f} points a Shift, where a greedy agent gets 2.25")

@@ -1,6 +1,6 @@
 """Draws how duplicate deals reduce the standard error: `python -m chefshat_paper.experiments.duplicates FILE --out PNG`.
 
-FILE is the output of `chefshat experiment duplicates --json`.
+FILE is the output of the example `duplicates --json` of chefshat-simulation.
 """
 
 import argparse
