@@ -439,6 +439,10 @@ def test_a_prior_shares_the_rollouts() -> None:
     assert improved.sum() == pytest.approx(1)
     assert (improved > 0).all()
     assert improved[np.nanargmax(found.points)] > prior[np.nanargmax(found.points)] / prior.sum()
+    # A budget is only exceeded for the first 4 deals. What they leave of it is for the actions that stay.
+    for rollouts, counts in ((4, [4] * 8), (33, [4] * 8), (34, [5, 5, *[4] * 6]), (35, [5, 5, *[4] * 6])):
+        few = position.evaluate(rollouts, prior=prior, considered=8, seed=1)
+        assert sorted(few.rollouts.tolist(), reverse=True)[:8] == counts
     certain = np.eye(len(legal))[2]
     assert (position.evaluate(40, prior=certain).improved(certain) == certain).all()
     zeros = np.zeros(3)

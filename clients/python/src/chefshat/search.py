@@ -333,11 +333,13 @@ class Position:
         points, places = np.empty((2, 0, len(likeliest)))
         spent = 0
         for left in range(rounds, 0, -1):
-            more = max(1 if spent else 4, (rollouts - spent) // (left * len(active)))
-            new = np.full((2, more, len(likeliest)), np.nan)
-            new[:, :, active] = self._shifts(chosen[likeliest[active]], len(points), more, agent, threads, seed)
-            points, places = np.concatenate([points, new[0]]), np.concatenate([places, new[1]])
-            spent += more * len(active)
+            more = max(0 if spent else 4, (rollouts - spent) // (left * len(active)))
+            # The budget may be spent, or too small for a deal of all these actions: of fewer, it may not be.
+            if more:
+                new = np.full((2, more, len(likeliest)), np.nan)
+                new[:, :, active] = self._shifts(chosen[likeliest[active]], len(points), more, agent, threads, seed)
+                points, places = np.concatenate([points, new[0]]), np.concatenate([places, new[1]])
+                spent += more * len(active)
             if left > 1:
                 means = points[:, active].mean(axis=0)
                 by_score = np.argsort(-scores(means, prior[likeliest[active]], len(points)), kind="stable")
