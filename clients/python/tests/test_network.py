@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from hand_made import hand_made
 
 from chefshat import SeatInfo, VectorEnv, pb
 from chefshat.learn import features, network
+from chefshat.learn.__main__ import main
 from chefshat.learn.network import Layer, Network, NetworkFileError, NetworkInfo
 from chefshat.learn.play import NetworkAgent, RulesDoNotFit
 
@@ -83,6 +85,29 @@ def test_other_files_are_refused_with_a_reason(tmp_path: Path) -> None:
         network.load(tmp_path / "nothing")
     with pytest.raises(IsADirectoryError, match="is a folder: give the network itself"):
         network.load(tmp_path)
+
+
+@pytest.mark.server
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["evaluate", "trained"],
+        ["value", "trained", "--out", "OUT"],
+        ["play", "trained", "--address", "127.0.0.1:1", "--code", "ABCDEF", "--name", "Ada"],
+        ["ppo", "--begin-with", "trained", "--out", "OUT", "--decisions", "1"],
+    ],
+)
+def test_the_network_of_trained_needs_a_package(
+    arguments: list[str], real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "chefshat_native", None)
+    address = [] if "--address" in arguments else ["--address", real_address]
+    out = str(tmp_path / "n.safetensors")
+    assert main([*(out if argument == "OUT" else argument for argument in arguments), *address, "--json"]) == 1
+    error = json.loads(capsys.readouterr().out)
+    assert (error["event"], error["reason"]) == ("error", "NATIVE_MISSING")
+    assert "pip install 'chefshat[native]'" in error["message"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_weights_that_float16_cannot_hold_are_not_written(tmp_path: Path) -> None:

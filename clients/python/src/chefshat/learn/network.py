@@ -18,6 +18,7 @@ import safetensors
 import safetensors.numpy
 
 from chefshat.columns import Observations, Situations
+from chefshat.errors import ChefsHatError
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 from chefshat.masks import unpack
@@ -278,11 +279,14 @@ def load(path: str | os.PathLike[str]) -> Network:
     Raises:
         NetworkFileError: the file is not a network.
         OSError: it cannot be read.
-        ModuleNotFoundError: "trained" without chefshat-native.
+        ChefsHatError: "trained" without chefshat-native.
     """
     if os.fspath(path) == TRAINED:
-        import chefshat_native
-
+        try:
+            import chefshat_native
+        except ModuleNotFoundError as error:
+            words = f"the network of `{TRAINED}` is in the package chefshat-native: pip install 'chefshat[native]'"
+            raise ChefsHatError("NATIVE_MISSING", words) from error
         file = chefshat_native.trained_network()
     elif os.fspath(path) == TRAINED_POINTS:
         file = Path(__file__).with_name(f"{TRAINED_POINTS}.safetensors").read_bytes()
