@@ -209,7 +209,9 @@ def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path
     best_response += ["--opponent-games", "8", "--opponents", "trained", "--json"]
     assert command.main([*best_response, "--begin-with", str(CLASSIC)]) == 1
     assert "is not a policy of `ppo`" in json.loads(capsys.readouterr().out)["message"]
-    assert command.main([*best_response, "--begin-with", str(first)]) == 0
+    assert command.main([*best_response, "--begin-with", str(first), "--width", "16"]) == 1
+    assert f"--width 16: the layers of {first} have 8, 8 units" in json.loads(capsys.readouterr().out)["message"]
+    assert command.main([*best_response, "--begin-with", str(first), "--width", "8"]) == 0
     trained = json.loads(capsys.readouterr().out)
     assert trained["decisions"] == 128
     assert [evaluation["opponents"][0] for evaluation in trained["evaluations"]] == ["greedy", "random", "trained"]
@@ -246,6 +248,10 @@ def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: p
     both = ["ppo", "--out", nothing, "--decisions", "1", "--all-hands", "--opponent-games", "8", "--address", real_address]
     assert command.main(both) == 1
     assert "leave out --all-hands" in capsys.readouterr().err
+    for ignored in (["--opponent-python", "python"], ["--opponent-arguments", "{}"]):
+        against = ["--opponent-games", "8", "--opponents", "greedy", "trained", "greedy", *ignored]
+        assert command.main(["ppo", "--out", nothing, "--decisions", "1", *against, "--address", real_address]) == 1
+        assert "none of greedy, trained, greedy is one of an installed package" in capsys.readouterr().err
     assert command.main(["evaluate", nothing, "--address", real_address]) == 1
     assert "nothing.safetensors" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

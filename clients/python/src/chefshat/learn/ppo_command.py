@@ -74,6 +74,13 @@ def _start(options: argparse.Namespace) -> Training:
         raise ValueError(f"--coalition needs --opponent-games, and rules for at least {COALITION_PLAYERS} players")
     begin_with = None if options.begin_with is None else _policy(options.begin_with, rules)
     widths = (options.width,) * 2 if begin_with is None else tuple(len(layer.bias) for layer in begin_with.layers[:-1])
+    if "width" in options.given and (options.width,) * len(widths) != widths:
+        raise ValueError(f"--width {options.width}: the layers of {options.begin_with} have {', '.join(map(str, widths))} units")
+    if options.given.keys() & {"opponent_python", "opponent_arguments"} and not any(map(plugins.find, options.opponents)):
+        raise ValueError(
+            "--opponent-python and --opponent-arguments are for opponents of plug-ins; none of "
+            f"{', '.join(options.opponents)} is one of an installed package"
+        )
     plan = Plan(
         games=options.games,
         opponent_games=options.opponent_games,
