@@ -46,6 +46,8 @@ def test_the_adapter_for_stable_baselines() -> None:
     pytest.importorskip("chefshat_native")
     pytest.importorskip("stable_baselines3")
     adapter = importlib.import_module("chefshat.envs.stable_baselines")
+    with pytest.raises(ValueError, match="autoreset_mode"):
+        adapter.ChefsHatVecEnv(2, autoreset_mode="next_step")
     env = adapter.ChefsHatVecEnv(3, observation="columns", rewards="points")
     env.seed(7)
     first = env.reset()

@@ -29,7 +29,13 @@ class ChefsHatVecEnv(NotCopied, VecEnv):  # type: ignore[misc]  # It may not be 
     """
 
     def __init__(self, num_envs: int, **options: Unpack[OneSeatOptions]) -> None:
-        """Starts the games. `options` are the arguments of `ChefsHatVectorEnv`."""
+        """Starts the games.
+
+        `options` are the arguments of `ChefsHatVectorEnv`, without `autoreset_mode`: algorithms expect the first observation of the
+        next episode in the step that ends one. Raises ValueError for that argument.
+        """
+        if "autoreset_mode" in options:
+            raise ValueError("autoreset_mode: games of Stable-Baselines3 begin their next episode in the step that ends one")
         self.games = ChefsHatVectorEnv(num_envs=num_envs, **options)
         self._actions = np.zeros(num_envs, np.int64)
         self._seed: int | None = None
