@@ -392,6 +392,21 @@ def test_an_interrupt_ends_everything(
     assert open_rooms(real_address) <= before
 
 
+@pytest.mark.parametrize("child", ["", "import subprocess; subprocess.Popen(['sleep', '60']);"])
+def test_the_output_of_a_program_is_not_kept_but_for_its_end(child: str) -> None:
+    written = f"import sys; {child} [print('x' * 1023) for _ in range(4096)]; print('\x1bthe end', file=sys.stderr); sys.exit(3)"
+
+    async def played() -> rooms._Process:
+        command = Command(shlex.join([sys.executable, "-c", written]) + " {address} {code}")
+        async with rooms._Process(command, ServerAddress("localhost:1", token="")) as process:
+            assert await process.wait() == 3
+            assert process.last_lines().endswith("x\n  | the end")
+            return process
+
+    process = asyncio.run(played())
+    assert len(process._output) == rooms.LAST_BYTES
+
+
 def test_a_room_that_is_created_while_the_games_end_is_closed(real_address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     create = AsyncRooms.create
 

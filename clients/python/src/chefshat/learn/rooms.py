@@ -9,7 +9,7 @@ import os
 import shlex
 import signal
 import sys
-import tempfile
+import threading
 import time
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -41,9 +41,13 @@ CLOSE_S = 30.0
 RECORD_PAUSES_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 # Seconds between looks at a thread that begins.
 PAUSE_S = 0.01
-# Lines of a program's output that an error shows, and the most characters.
+# Lines of a program's output that an error shows, and the bytes of it that are kept for them.
 LAST_LINES = 8
-LAST_CHARACTERS = 4096
+LAST_BYTES = 4096
+# Bytes read at a time.
+CHUNK_BYTES = 64 << 10
+# Seconds to wait for the end of the output, which another process may hold open.
+OUTPUT_S = 0.5
 MAX_NAME = 64
 #: Reason of the error of a player: what it raised, or why its program could not play.
 AGENT_FAILED = "AGENT_FAILED"
@@ -360,26 +364,37 @@ class _Process:
         # With TLS a program must see the scheme.
         self._address = server.address.removeprefix("http://").rstrip("/")
         self._process: asyncio.subprocess.Process
+        self._output = b""
 
     async def __aenter__(self) -> "_Process":
         words = self._command.filled(self._address, self._code)
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed with this object.
         environment = {name: value for name, value in os.environ.items() if name != TOKEN or self._server.token is None}
         given = {TOKEN: self._server.token, CA: self._server.ca}
         environment |= {name: str(value) for name, value in given.items() if value}
+        # Not one of asyncio's pipes: it would wait for all processes that have the pipe, not for this one alone.
+        reading, writing = os.pipe()
+        self._reader = threading.Thread(target=self._read, args=[reading], daemon=True)
+        self._reader.start()
         try:
             self._process = await asyncio.create_subprocess_exec(
                 *words,
                 stdin=asyncio.subprocess.PIPE if self._command.reads_games else asyncio.subprocess.DEVNULL,
-                stdout=self._log,
-                stderr=self._log,
+                stdout=writing,
+                stderr=writing,
                 env=environment,
                 process_group=0,
             )
         except OSError as error:
-            self._log.close()
             raise ChefsHatError(AGENT_FAILED, f"{words[0]} cannot be started: {error}") from error
+        finally:
+            os.close(writing)
         return self
+
+    def _read(self, reading: int) -> None:
+        """Reads the output to its end, and keeps the last bytes."""
+        with open(reading, "rb", buffering=0) as output:
+            while some := output.read(CHUNK_BYTES):
+                self._output = (self._output + some)[-LAST_BYTES:]
 
     async def __aexit__(self, *_: object) -> None:
         """Kills what is left of it."""
@@ -389,7 +404,6 @@ class _Process:
             else:
                 os.killpg(self._process.pid, signal.SIGKILL)
         await self._process.wait()
-        self._log.close()
 
     def give(self, code: str) -> None:
         """Lets it read of a game."""
@@ -408,9 +422,9 @@ class _Process:
             await asyncio.wait_for(self._process.wait(), EXIT_S)
 
     def last_lines(self) -> str:
-        """Returns the last lines of its output, for an error message."""
-        self._log.seek(max(0, self._log.seek(0, os.SEEK_END) - LAST_CHARACTERS))
-        lines = self._log.read().decode(errors="replace").splitlines()[-LAST_LINES:]
+        """Returns the last lines of the output of a process that has ended, for an error message."""
+        self._reader.join(OUTPUT_S)
+        lines = self._output.decode(errors="replace").splitlines()[-LAST_LINES:]
         # A terminal must not receive control characters.
         plain = ["".join(character for character in line if character.isprintable()) for line in lines]
         return "".join(["; its last lines:", *(f"\n  | {line}" for line in plain)] if plain else [])
