@@ -112,6 +112,23 @@ def test_agents_with_a_mask_take_no_illegal_action(real_address: str) -> None:
 
 
 @pytest.mark.server
+def test_statistics_are_kept_of_any_number_of_shifts(real_address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, mask=True)
+
+    def played() -> deep_q_training.Played:
+        with games(real_address, seats=[1], seeds=[bytes(32), bytes([1]) * 32], invalid="error") as env:
+            return deep_q_training.play(env, config, deep_q.start(config, [1, 2]))[1]
+
+    expected = played()
+    assert expected.of_seats["places"].shape == (2, 2, 4)
+    monkeypatch.setattr(deep_q_training, "FIRST_SHIFTS", 1)
+    found = played()
+    for ours, theirs in ((found.of_shifts, expected.of_shifts), (found.of_seats, expected.of_seats)):
+        for name in theirs:
+            np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
+
+
+@pytest.mark.server
 def test_an_agent_is_trained_and_resumed(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "agent.safetensors"
     command = ["deep-q", "--out", str(out), "--shifts", "2", "--mask", "--address", real_address, "--json"]

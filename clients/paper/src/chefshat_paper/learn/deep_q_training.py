@@ -25,6 +25,8 @@ Mask: TypeAlias = npt.NDArray[np.bool_]
 # Statistics of a Shift, and of each seat in it.
 OF_SHIFTS = ("starters", "pizzas", "laps", "turns", "adjudicated")
 OF_SEATS = ("places", "points", "valid", "wrong", "passes", "reward_sums")
+# Shifts for whose statistics there is room at first.
+FIRST_SHIFTS = 1024
 
 
 class LockStep:
@@ -202,7 +204,8 @@ class ShiftLog:
     def __init__(self, env: VectorEnv) -> None:
         self._env = env
         self._shifts = env.rules.target_shifts
-        shape = (env.games, self._shifts)
+        # A budget of decisions allows for more Shifts than are played.
+        shape = (env.games, min(self._shifts, FIRST_SHIFTS))
         self._of_shifts = {name: np.zeros(shape, np.int64) for name in OF_SHIFTS}
         self._of_seats = {name: np.zeros((*shape, env.players), np.int64) for name in OF_SEATS}
         self._of_seats["reward_sums"] = np.zeros((*shape, env.players), np.float32)
@@ -216,17 +219,29 @@ class ShiftLog:
         ended = batch.shifts
         if ended is None or len(ended) == 0:
             return 0
+        while ended.shifts.max() > self._ended.shape[1]:
+            self._grow()
         at = (ended.games.astype(np.intp), ended.shifts.astype(np.intp) - 1)
         for name, array in (*self._of_shifts.items(), *self._of_seats.items()):
             array[at] = getattr(ended, name)
         self._ended[at] = True
         return len(ended)
 
+    def _grow(self) -> None:
+        """Makes room for twice as many Shifts."""
+
+        def grown(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+            return np.concatenate([array, np.zeros_like(array)], axis=1)
+
+        self._of_shifts = {name: grown(array) for name, array in self._of_shifts.items()}
+        self._of_seats = {name: grown(array) for name, array in self._of_seats.items()}
+        self._ended = grown(self._ended)
+
     def played(self, *, ended_early: bool = False) -> Played:
         """Returns the statistics of all Shifts; of games that were ended early, of those that have ended in all of them."""
         shifts = int(self._ended.all(axis=0).sum()) if ended_early else self._shifts
-        if not self._ended[:, :shifts].all():
-            raise RuntimeError(f"only {int(self._ended.sum())} of {self._ended.size} Shifts ended")
+        if (ended := int(self._ended[:, :shifts].sum())) < len(self._ended) * shifts:
+            raise RuntimeError(f"only {ended} of {len(self._ended) * shifts} Shifts ended")
         of_shifts, of_seats = (
             {name: array[:, :shifts] for name, array in arrays.items()} for arrays in (self._of_shifts, self._of_seats)
         )
