@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,15 @@ def test_samples_follow_from_the_seed() -> None:
     assert np.corrcoef(more_cards, samples.points)[0, 1] < -0.3
     with pytest.raises(ValueError, match="too few to learn from"):
         value.learn(dataclasses.replace(samples, shifts=np.zeros_like(samples.shifts)), 8, 1, 1, 5)
+
+
+def test_inputs_are_in_memory_once() -> None:
+    trained = network.load("trained")
+    tracemalloc.start()
+    samples, _ = value.play(trained, Path("trained"), 4000, 1, "paper", None)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 2 * samples.inputs.nbytes
 
 
 def test_the_value_of_trained() -> None:

@@ -37,6 +37,8 @@ EXPLORED = 20
 # The share of Shifts for validation.
 VALIDATION = 0.1
 MINIBATCH = 1024
+# Rows that are moved at a time.
+CHUNK = 1024
 LEARNING_RATE = 1e-3
 
 
@@ -121,7 +123,6 @@ def play(
         raise ValueError(f"{file} has outputs for {policy.info.output}: a value is that of a policy for all actions")
     opponent = network.TRAINED if str(file) == network.TRAINED else file
     rng = np.random.default_rng(seed)
-    inputs: list[npt.NDArray[np.float16]] = []
     cards: list[npt.NDArray[np.uint8]] = []
     shifts_of: list[npt.NDArray[np.int64]] = []
     # The Shifts that have ended, and their points.
@@ -132,6 +133,8 @@ def play(
         if not policy.info.fits(env.players, env.faces, env.hand_size):
             raise ValueError(f"{file} plays with {policy.info.players} players and {policy.info.faces} faces, not in these games")
         worth = np.array(env.rules.points, np.float32)
+        # These take nearly all of the memory, so they exist once.
+        inputs = np.empty((decisions + GAMES, features.table_width(env.players, env.faces)), np.float16)
         # Of each game: its Shift, the number of its next decision there, and that of the random action.
         shift, number, explored = np.arange(GAMES), np.zeros(GAMES, np.int64), rng.integers(EXPLORED, size=GAMES)
         begun, kept = GAMES, 0
@@ -141,7 +144,7 @@ def play(
                 batch, games = env.batch, env.batch.games
                 rows = np.flatnonzero(number[games] > explored[games])
                 if len(rows):
-                    inputs.append(features.table_of(selected(batch, rows)).astype(np.float16))
+                    inputs[kept : kept + len(rows)] = features.table_of(selected(batch, rows))
                     cards.append(batch.observations.cards_left[rows])
                     shifts_of.append(shift[games[rows]])
                     kept += len(rows)
@@ -160,8 +163,11 @@ def play(
     points = np.full(begun, np.nan, np.float32)
     points[np.concatenate(ended_shifts)] = np.concatenate(ended_points)
     shifts = np.concatenate(shifts_of)
-    known = ~np.isnan(points[shifts])
-    samples = Samples(np.concatenate(inputs)[known], np.concatenate(cards)[known], points[shifts[known]], shifts[known])
+    known = np.flatnonzero(~np.isnan(points[shifts]))
+    for first in range(0, len(known), CHUNK):
+        part = known[first : first + CHUNK]
+        inputs[first : first + len(part)] = inputs[part]
+    samples = Samples(inputs[: len(known)], np.concatenate(cards)[known], points[shifts[known]], shifts[known])
     return samples, rules_used
 
 
