@@ -14,9 +14,11 @@ from hand_made import hand_made
 
 from chefshat import SeatInfo, VectorEnv, pb
 from chefshat.learn import features, network
-from chefshat.learn.__main__ import main
+from chefshat.learn.__main__ import main, parse
+from chefshat.learn.command import MAX_WIDTH
 from chefshat.learn.network import Layer, Network, NetworkFileError, NetworkInfo
 from chefshat.learn.play import NetworkAgent, RulesDoNotFit
+from chefshat.vector_setup import MAX_NETWORK_BYTES
 
 FIXTURES = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network"
 INFO = NetworkInfo("table", "actions", "none", True, 4, 11, 2, '{"preset":"paper"}', "a name", "a command --with ünïcode")
@@ -108,6 +110,31 @@ def test_the_network_of_trained_needs_a_package(
     assert (error["event"], error["reason"]) == ("error", "NATIVE_MISSING")
     assert "pip install 'chefshat[native]'" in error["message"]
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("widths", "words"), [((8193, 1), r"up to 8,193 units"), ((6000, 6000), r"74 MiB .* at most 64 MiB")])
+def test_networks_that_no_agent_reads_are_not_written(widths: tuple[int, int], words: str) -> None:
+    sizes = INFO.input_width, *widths, INFO.output_width
+    layers = [
+        (np.zeros((outputs, inputs), np.float16), np.zeros(outputs, np.float16)) for inputs, outputs in itertools.pairwise(sizes)
+    ]
+    with pytest.raises(ValueError, match=words):
+        network.encoded(layers, INFO, dtype=np.float16)
+
+
+@pytest.mark.parametrize("arguments", [["ppo", "--decisions", "1"], ["value", "trained"]])
+def test_the_widest_networks_of_trainings_are_read(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [*arguments, "--out", str(tmp_path / "n"), "--width"]
+    assert parse([*command, "4096"]).width == MAX_WIDTH == 4096
+    with pytest.raises(SystemExit):
+        parse([*command, "4097"])
+    assert "agents read no larger networks" in capsys.readouterr().err
+    # The rules with the most players and faces.
+    largest = replace(INFO, players=6, faces=15)
+    sizes = largest.input_width, MAX_WIDTH, MAX_WIDTH, largest.output_width
+    assert 2 * sum((inputs + 1) * outputs for inputs, outputs in itertools.pairwise(sizes)) < MAX_NETWORK_BYTES - (1 << 20)
 
 
 def test_weights_that_float16_cannot_hold_are_not_written(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from chefshat.learn.command import (
     json_object,
     natural,
     share,
+    units,
     zero_or_more,
 )
 
@@ -90,7 +91,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--steps", type=count, default=128, help="decisions in each game between two updates")
     plan.add_argument("--epochs", type=count, default=2, help="passes over them in an update")
     plan.add_argument("--minibatches", type=count, default=16, help="number of parts they are split into")
-    plan.add_argument("--width", type=count, default=256, help="units of each of the policy network's two hidden layers")
+    plan.add_argument("--width", type=units, default=256, help="units of each of the policy network's two hidden layers")
     plan.add_argument("--value-width", type=count, default=128, help="units of each of the value network's two hidden layers")
     plan.add_argument(
         "--all-hands",
@@ -129,9 +130,9 @@ def _evaluate(command: argparse.ArgumentParser) -> None:
 def _value(command: argparse.ArgumentParser) -> None:
     command.add_argument("policy", type=Path, help="the network of the policy, or trained: that of the built-in agent")
     command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network to write")
-    command.add_argument("--decisions", type=count, default=500_000, help="decisions to learn from")
+    command.add_argument("--decisions", type=count, default=500_000, help="decisions to learn from, of some 700 bytes each")
     command.add_argument("--epochs", type=count, default=10, help="passes over them")
-    command.add_argument("--width", type=count, default=128, help="units of each of the two hidden layers")
+    command.add_argument("--width", type=units, default=128, help="units of each of the two hidden layers")
     add_games(command)
     add_rules(command)
     add_force(command)

@@ -15,6 +15,7 @@ from typing import Any
 
 from chefshat import join_options
 
+MAX_WIDTH = 4096
 # Adds the options of a command.
 AddOptions = Callable[[argparse.ArgumentParser], None]
 
@@ -131,6 +132,14 @@ def count(text: str) -> int:
     number = natural(text)
     if number == 0:
         raise argparse.ArgumentTypeError("must be at least 1")
+    return number
+
+
+def units(text: str) -> int:
+    """Parses the width of hidden layers. Two of the widest, in float16, are smaller than the largest file that agents read."""
+    number = count(text)
+    if number > MAX_WIDTH:
+        raise argparse.ArgumentTypeError(f"must be at most {MAX_WIDTH}: agents read no larger networks")
     return number
 
 

@@ -22,12 +22,15 @@ from chefshat.errors import ChefsHatError
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 from chefshat.masks import unpack
+from chefshat.vector_setup import MAX_NETWORK_BYTES
 
 FORMAT = "chefshat-network-1"
 # The built-in agent that is a network.
 TRAINED = "trained"
 # Its value network.
 TRAINED_POINTS = "trained_points"
+# Maximum number of units or inputs of a layer that `chefshat` reads.
+MAX_UNITS = 8192
 
 Floats = npt.NDArray[np.float32]
 Actions = npt.NDArray[np.uint16]
@@ -259,7 +262,8 @@ def encoded(layers: Sequence[AnyLayer], info: NetworkInfo, *, dtype: type[np.flo
         dtype: type of the numbers in the file.
 
     Raises:
-        ValueError: the layers do not fit each other or the description, or contain numbers out of the range of `dtype`.
+        ValueError: the layers do not fit each other or the description, contain numbers out of the range of `dtype`, or are too
+            large for the agents of `chefshat`.
     """
     tensors: dict[str, npt.NDArray[np.floating]] = {}
     for number, (weight, bias) in enumerate(Network(layers, info).layers):
@@ -268,7 +272,14 @@ def encoded(layers: Sequence[AnyLayer], info: NetworkInfo, *, dtype: type[np.flo
             tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"] = weight.astype(dtype), bias.astype(dtype)
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
         raise ValueError(f"its weights are too large for {dtype.__name__}")
-    return safetensors.numpy.save(tensors, metadata=info.metadata())
+    file = safetensors.numpy.save(tensors, metadata=info.metadata())
+    most = max(size for tensor in tensors.values() for size in tensor.shape)
+    if most > MAX_UNITS or len(file) > MAX_NETWORK_BYTES:
+        raise ValueError(
+            f"a network of {len(file) >> 20} MiB with layers of up to {most:,} units: agents read at most "
+            f"{MAX_NETWORK_BYTES >> 20} MiB and {MAX_UNITS:,} units"
+        )
+    return file
 
 
 def load(path: str | os.PathLike[str]) -> Network:
