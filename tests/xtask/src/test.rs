@@ -206,18 +206,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         if let Err(failure) = setup::r() {
             steps.skip("the analysis in R", &failure.to_string());
         }
-        let mut runs = in_rust.integration;
-        if slow {
-            // The others that are ignored measure something.
-            let ignored = ["--test", "smoke", "--", "--ignored"];
-            runs.push(cargo_test(places, *options, &ignored));
+        for run in std::mem::take(&mut in_rust.whole) {
+            lanes.push(Box::new(|steps| of_all(steps, [run])));
         }
-        lanes.push(Box::new(move |steps| {
-            if slow {
-                lint::platforms(places, steps)?;
-            }
-            of_all(steps, runs)
-        }));
     }
     if wants(Part::Python) && !has_python {
         steps.skip("pytest", NO_PYTHON_PACKAGE);
@@ -243,20 +234,25 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     }
     if wants(Part::Web) {
         match has_web {
-            true => {
-                lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow)));
-                lanes.push(Box::new(|steps| web::test(places, steps)));
-            }
+            true => lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow))),
             false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
         }
     }
     if wants(Part::Rust) {
-        let mut runs = in_rust.units;
+        let mut runs = in_rust.crates;
         runs.push(cargo_test(places, *options, &["--doc"]));
-        lanes.push(Box::new(|steps| of_all(steps, runs)));
+        lanes.push(Box::new(move |steps| {
+            if slow {
+                lint::platforms(places, steps)?;
+            }
+            of_all(steps, runs)
+        }));
     }
     if deployment {
         lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
+    }
+    if wants(Part::Web) && has_web {
+        lanes.push(Box::new(|steps| web::test(places, steps)));
     }
     if wants(Part::Python) && has_python {
         lanes.push(Box::new(|steps| {
@@ -290,11 +286,19 @@ fn of_all(steps: &mut Steps, runs: impl IntoIterator<Item = Run>) -> Result<(), 
 /// A step that runs a program.
 type Run = (String, Command);
 
+/// The folder of the tests that start servers and clusters.
+const WHOLE: &str = "tests";
+
+/// The modules of tests that are ignored because they measure something; the others take long.
+const MEASURING: [&str; 3] = ["measure::", "growth::", "alerts::"];
+
 /// The programs of the tests in Rust.
 #[derive(Default)]
 struct TestsInRust {
-    integration: Vec<Run>,
-    units: Vec<Run>,
+    /// Of whole servers and clusters, which mostly wait.
+    whole: Vec<Run>,
+    /// Of single crates.
+    crates: Vec<Run>,
 }
 
 impl TestsInRust {
@@ -319,14 +323,19 @@ impl TestsInRust {
             let target = built["target"]["name"].as_str().unwrap_or_default();
             let mut tests = with_environment(places, Command::new(program));
             with_extent(tests.current_dir(folder), options);
+            let is_integration = built["target"]["kind"][0] == "test";
+            if options.slow && is_integration {
+                tests.arg("--include-ignored");
+                tests.args(MEASURING.iter().flat_map(|module| ["--skip", module]));
+            }
             let run = (format!("{}, tests of {target}", package.display()), tests);
-            if built["target"]["kind"][0] == "test" {
-                found.integration.push(run);
+            if is_integration && package.starts_with(WHOLE) {
+                found.whole.push(run);
             } else {
-                found.units.push(run);
+                found.crates.push(run);
             }
         }
-        if found.integration.is_empty() || found.units.is_empty() {
+        if found.whole.is_empty() || found.crates.is_empty() {
             return Err(Failure::new("Cargo names no programs of tests"));
         }
         Ok(found)

@@ -12,11 +12,18 @@ const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.mi
 /** As narrow as the smallest phone, or a computer whose page is enlarged to 400 %. */
 export const PHONE = { width: 320, height: 740 };
 
-/** Phones, the smallest first, and one on its side. */
-export const PHONES = [PHONE, { width: 375, height: 667 }, { width: 390, height: 664 }, { width: 667, height: 375 }];
+/** Whether the long tests are run. */
+const SLOW = process.env.CHEFSHAT_SLOW !== undefined;
 
-/** The languages in which pages are looked at: all in long tests (CHEFSHAT_SLOW), otherwise the one with the longest texts. */
-export const LANGUAGES = languages.filter(({ value }) => process.env.CHEFSHAT_SLOW || value === "de");
+/** Phones, the smallest first, and one on its side; in long tests, also usual ones. */
+const USUAL = [
+  { width: 375, height: 667 },
+  { width: 390, height: 664 },
+];
+export const PHONES = [PHONE, ...(SLOW ? USUAL : []), { width: 667, height: 375 }];
+
+/** The languages in which pages are looked at: all in long tests, otherwise the one with the longest texts. */
+export const LANGUAGES = languages.filter(({ value }) => SLOW || value === "de");
 
 /**
  * Everything that axe-core finds in the light theme, with any impact, also against best practice, and
