@@ -114,6 +114,7 @@ async function playTicket(server, ticket) {
         for await (const { updates } of stream) {
           failures = 0;
           for (const { handle, update, [update]: content } of updates) {
+            if (!update) continue; // Of a kind that is newer than the .proto files.
             if (content.reason === "DETACH_REASON_SERVER_STOPPING") continue; // The end of the stream follows.
             if (update === "attached" && content.ticket) {
               const known = seats.find(({ ticket }) => ticket === content.ticket);

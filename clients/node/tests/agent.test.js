@@ -55,7 +55,9 @@ async function serveWith({ token }, ...connections) {
       done(null, { participant: 5, ticket: "cup" });
     },
   });
-  server.addService(protocol.PlayService.service, {
+  const { Play } = protocol.PlayService.service;
+  const responseSerialize = (message) => (Buffer.isBuffer(message) ? message : Play.responseSerialize(message));
+  server.addService({ Play: { ...Play, responseSerialize } }, {
     Play: async (stream) => {
       const messages = stream[Symbol.asyncIterator]();
       const read = async () => (await messages.next()).value?.commands;
@@ -111,6 +113,17 @@ test("a game: attaches, answers with set bits, returns the standings", async () 
   for (const [, action] of answers) assert.ok([10, 13].includes(action), `action ${action} is not in the mask`);
   assert.equal(server.joins.length, 1);
   assert.deepEqual([server.joins[0].name, server.joins[0].kind], ["Ada", "PARTICIPANT_KIND_AGENT"]);
+});
+
+test("what a newer server adds is ignored", async () => {
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached] });
+    stream.write(Buffer.from([0x0a, 3, 0xc2, 0x0c, 0])); // An update with field 200.
+    stream.write(Buffer.from([0x0a, 9, 0x1a, 7, 0x0a, 5, 0x08, 1, 0xc2, 0x0c, 0])); // Event 1, with field 200.
+    stream.write({ updates: [events(ended(2)), detached("GAME_OVER")] });
+  });
+  assert.deepEqual(await play({ address: server.address, ticket: "a ticket" }), { seat: 2, standings: STANDINGS });
 });
 
 test("a lost connection is replaced by one that resumes after the last event seen", async () => {
