@@ -100,19 +100,23 @@ async function playTicket(server, ticket) {
   const client = connect(protocol.PlayService, server);
   const pause = server.pause ?? sleep;
   let [seats, tournament, participant] = [[seatOf(ticket)]];
-  let [outcomes, lost] = [[], new Error("the server ended the stream")];
+  const outcomes = [];
+  let lost;
   try {
     for (let failures = 0; failures < MAX_FAILURES; failures += 1) {
       if (failures) await pause(Math.min(MAX_DELAY_MS, 50 * 2 ** failures) * (0.5 + 0.5 * Math.random()));
-      const stream = client.Play().on("error", (error) => { lost = error; });
+      lost = new Error("the server ended the stream");
+      const stream = client.Play().on("error", (error) => { if (error.code !== "ABORT_ERR") lost = error; }); // Node's own, after such an end.
       const commands = seats.map(({ ticket, next }) => ({ attach: { ticket, from_sequence: next } }));
       if (tournament) commands.push({ attach: { ticket: tournament } }); // Last, so that the server does not attach its seats again.
       stream.write({ commands });
       const byHandle = new Map(seats.entries()); // Handles number the attachments of the client; the server adds further ones.
       let entered = tournament ? seats.length : -1;
+      let messages = 0;
       try {
         for await (const { updates } of stream) {
-          failures = 0;
+          messages += 1;
+          if (messages > 1) failures = 0; // A stream begins with the state, so only what follows it is progress.
           for (const { handle, update, [update]: content } of updates) {
             if (!update) continue; // Of a kind that is newer than the .proto files.
             if (content.reason === "DETACH_REASON_SERVER_STOPPING") continue; // The end of the stream follows.

@@ -161,24 +161,33 @@ test("a lost server is waited for, about ten minutes", async () => {
     await read();
     stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "stopping" });
   };
-  const delays = [];
+  const begins = async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events({ sequence: 1 })] });
+    stream.end();
+  };
   const pause = async (ms) => { delays.push(ms); };
-  const server = await serve(...Array(500).fill(lost));
-  await assert.rejects(play({ address: server.address, ticket: "a ticket", pause }), /stopping/);
-  assert.ok(delays.every((ms) => ms > 0 && ms <= 5_000));
-  const minutes = delays.reduce((sum, ms) => sum + ms) / 60_000;
-  assert.ok(minutes > 8 && minutes < 13, `${minutes} minutes`);
+  const delays = [];
+  const server = await serve();
+  for (const [breaks, message] of [[lost, /stopping/], [begins, /the server ended the stream/]]) {
+    delays.length = 0;
+    server.remaining.splice(0, Infinity, ...Array(300).fill(breaks));
+    await assert.rejects(play({ address: server.address, ticket: "a ticket", pause }), message);
+    assert.ok(delays.every((ms) => ms > 0 && ms <= 5_000));
+    const minutes = delays.reduce((sum, ms) => sum + ms) / 60_000;
+    assert.ok(minutes > 8 && minutes < 13, `${minutes} minutes`);
+  }
 
-  // Progress ends the outage: the next one has all its time.
-  delays.length = 0;
+  // What follows the state ends the outage: the next one has all its time.
   const works = async (stream, read) => {
     await read();
     stream.write({ updates: [attached] });
+    stream.write({ updates: [events({ sequence: 1 })] });
     stream.end();
   };
   const ends = async (stream, read) => {
     await read();
-    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+    stream.write({ updates: [attached, events(ended(2)), detached("GAME_OVER")] });
   };
   server.remaining.splice(0, Infinity, ...Array(100).fill(lost), works, ...Array(100).fill(lost), ends);
   assert.deepEqual(await play({ address: server.address, ticket: "a ticket", pause }), { seat: 2, standings: STANDINGS });
