@@ -65,6 +65,10 @@ function join(Service, method, server, request) {
 function seatOf(ticket, about = {}) {
   let [seat, end, open] = [undefined, {}, {}];
   const failed = (error) => ({ ...about, seat, error });
+  const known = () => { // Its ticket may be unknown soon after the end.
+    if (end.game_ended) return { ...about, seat, standings: end.game_ended.standings, over: true };
+    return end.game_aborted && { ...failed(`the game has no result (${end.game_aborted.reason})`), over: true };
+  };
   const self = {
     ticket,
     next: 0, // The number of the next event.
@@ -85,11 +89,10 @@ function seatOf(ticket, about = {}) {
       const again = status === "ANSWER_STATUS_INVALID" && decision_id === open.decision_id; // The server does not repeat the request.
       if (again) self.decision(open, send);
     },
-    refused: ({ message, reason }) => failed(`refused: ${message} (${reason})`),
+    refused: ({ message, reason }) => known() ?? failed(`refused: ${message} (${reason})`),
     detached: ({ reason }) => {
-      if (reason !== "DETACH_REASON_GAME_OVER") return failed(`the seat is lost (${reason})`);
-      if (!end.game_ended) return { ...failed(`the game has no result (${end.game_aborted?.reason})`), over: true };
-      return { ...about, seat, standings: end.game_ended.standings };
+      if (reason === "DETACH_REASON_GAME_OVER") return known() ?? { ...failed("the game has no result"), over: true };
+      return known() ?? failed(`the seat is lost (${reason})`);
     },
   };
   return self;
@@ -120,7 +123,10 @@ async function playTicket(server, ticket) {
           for (const { handle, update, [update]: content } of updates) {
             if (!update) continue; // Of a kind that is newer than the .proto files.
             if (content.reason === "DETACH_REASON_SERVER_STOPPING") continue; // The end of the stream follows.
-            if (update === "attached" && content.ticket) {
+            const isOver = update === "attached" && outcomes.some(({ game_id, over }) => over && game_id === content.game_id);
+            if (isOver) { // The connection was lost before the tournament counted the game.
+              stream.write({ commands: [{ handle, detach: {} }] });
+            } else if (update === "attached" && content.ticket) {
               const known = seats.find(({ ticket }) => ticket === content.ticket);
               byHandle.set(handle, known ?? seatOf(content.ticket, { game_id: content.game_id }));
               byHandle.get(handle).attached(content);

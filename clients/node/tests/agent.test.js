@@ -340,6 +340,48 @@ test("a tournament: several games at a time, through lost connections, to its en
   ]);
 });
 
+test("a game of a tournament that is over is not played again", async () => {
+  const heard = [];
+  const server = await serve(
+    async (stream, read) => {
+      await read();
+      stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a")] });
+      stream.write({ updates: [ofSeat(0, events(ended(1))), ofSeat(0, detached("GAME_OVER"))] });
+      stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "cut" });
+    },
+    async (stream, read) => {
+      await read();
+      stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a"), ofSeat(0, events(ended(1)))] });
+      const [{ handle, command }] = await read();
+      heard.push([handle, command]);
+      stream.write({ updates: [ofSeat(0, detached("REQUESTED")), over(0)] });
+    },
+  );
+  const played = await play({ address: server.address, tournament: "CUP", name: "Ada", games: "1" });
+  assert.deepEqual(played, { participant: 5, games: [{ game_id: "a", seat: 2, standings: STANDINGS }] });
+  assert.deepEqual(heard, [[2 ** 31, "detach"]]);
+});
+
+for (const [what, updates] of [
+  ["whose room is gone", [{ handle: 0, refused: { reason: "TICKET_UNKNOWN", message: "join again" } }]],
+  ["that a newer connection took", [attached, detached("SUPERSEDED")]],
+]) {
+  test(`the result of a game is known, also of one ${what} after its end`, async () => {
+    const server = await serve(
+      async (stream, read) => {
+        await read();
+        stream.write({ updates: [attached, events(ended(1))] });
+        stream.end();
+      },
+      async (stream, read) => {
+        await read();
+        stream.write({ updates });
+      },
+    );
+    assert.deepEqual(await play({ address: server.address, ticket: "a ticket" }), { seat: 2, standings: STANDINGS });
+  });
+}
+
 test("a newer connection in a tournament is an error and does not cause a reconnection", async () => {
   const server = await serve(async (stream, read) => {
     await read();
