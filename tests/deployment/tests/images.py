@@ -43,9 +43,10 @@ class Images:
 
     def base(self, name: str, packages: list[str], files: dict[Path, str], scripts: dict[str, str]) -> str:
         """Makes a base image: a minimal Debian with further packages, files and folders of this machine, and new scripts."""
-        system = self._cache / name
+        # Another list of packages makes another system.
+        system = self._cache / "-".join([name, *packages])
         if not system.exists():
-            part = self._cache / f"{name}.part"
+            part = system.with_suffix(".part")
             shutil.rmtree(part, ignore_errors=True)
             debian(part, "ca-certificates", "libstdc++6", *packages)
             shutil.copy(_AUTHORITIES, part / _AUTHORITIES.relative_to("/"))

@@ -9,7 +9,7 @@ from pathlib import Path
 import chefshat
 import pytest
 from chefshat import RandomAgent, pb
-from images import Container, Images, end, run, stop, until
+from images import ROOT, Container, Images, end, run, stop, until
 
 # The user of the images, who is nobody on this machine.
 USER = 65532
@@ -54,12 +54,18 @@ def test_a_server_and_an_agent_of_the_images_play(images: Images, base: str) -> 
 def test_the_images_are_built_from_source(images: Images, base: str) -> None:
     toolchain = Path(run(["rustc", "--print", "sysroot"]))
     # Some crates compile C.
-    rust = images.base("rust", ["gcc", "libc6-dev"], {toolchain: "/usr/local"}, {})
+    rust = images.base("rust", ["gcc", "libc6-dev", "make"], {toolchain: "/usr/local"}, {})
     bases = {"NODE_BASE": base, "RUST_BASE": rust, "SERVER_BASE": base}
     # Debian's buildah finds the stage only if it is named here.
     arguments = bases | {"BINARY": "build", "PROFILE": os.environ.get("CHEFSHAT_PROFILE", "dist")}
     image = images.build("server", arguments)
     check(images, image, images.build("node-agent", bases))
+
+
+def test_the_default_base_gets_what_jemalloc_is_built_with() -> None:
+    """The test above builds on Debian with make; the image of Rust on Alpine has none."""
+    stage = (ROOT / "docker/Dockerfile").read_text().split("FROM ${RUST_BASE} AS build")[1].split("\nFROM ")[0]
+    assert "tikv-jemalloc-sys" not in (ROOT / "Cargo.lock").read_text() or "apk add --no-cache make" in stage
 
 
 def check(images: Images, server_image: str, agent_image: str) -> None:
