@@ -1,6 +1,6 @@
 // An agent without an SDK: it reads the .proto files, joins a room or a tournament and takes a random legal action at every decision.
 // It contains no rules of the game. It reconnects after a lost connection; with its ticket another process can resume its seat.
-import { randomInt } from "node:crypto";
+import { randomBytes, randomInt } from "node:crypto";
 import { existsSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
@@ -16,7 +16,8 @@ export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM))
 
 const MAX_GAMES = 64; // Maximum number of games that a participant plays at a time.
 const MAX_FAILURES = 160; // Maximum number of consecutive connections without progress: together with the delays about ten minutes.
-const MAX_DELAY_MS = 5_000; // Maximum delay between two connections.
+const MAX_JOINS = 8; // Maximum number of attempts to join.
+const MAX_DELAY_MS = 5_000; // Maximum delay between two connections or attempts.
 const FINAL = [ // Not retried.
   "INVALID_ARGUMENT", "NOT_FOUND", "ALREADY_EXISTS", "PERMISSION_DENIED", "FAILED_PRECONDITION", "OUT_OF_RANGE", "UNIMPLEMENTED", "UNAUTHENTICATED",
 ].map((code) => grpc.status[code]);
@@ -55,10 +56,23 @@ export function legalActions(mask) {
   return Array.from({ length: mask.length * 8 }, (_, i) => i).filter((i) => mask[i >> 3] & (1 << (i & 7)));
 }
 
-function join(Service, method, server, request) {
+/** The delay after the n-th failure in a row, in milliseconds. */
+const delay = (n) => Math.min(MAX_DELAY_MS, 50 * 2 ** n) * (0.5 + 0.5 * Math.random());
+
+async function join(Service, method, { pause = sleep, ...server }, request) {
   const service = connect(Service, server);
-  const asked = { kind: "PARTICIPANT_KIND_AGENT", ...request };
-  return promisify(service[method]).call(service, asked, { deadline: Date.now() + 30_000 }).finally(() => service.close());
+  // With the same id, a call that is repeated after a lost response takes no second seat.
+  const asked = { kind: "PARTICIPANT_KIND_AGENT", request_id: randomBytes(32), ...request };
+  try {
+    for (let failures = 1; ; failures += 1) {
+      try {
+        return await promisify(service[method]).call(service, asked, { deadline: Date.now() + 30_000 });
+      } catch (error) {
+        if (failures === MAX_JOINS || FINAL.includes(error.code)) throw error;
+        await pause(delay(failures));
+      }
+    }
+  } finally { service.close(); }
 }
 
 /** A seat with a handler for each kind of update. `send` sends a command for it. A handler returns the outcome when the game is over. */
@@ -107,7 +121,7 @@ async function playTicket(server, ticket) {
   let lost;
   try {
     for (let failures = 0; failures < MAX_FAILURES; failures += 1) {
-      if (failures) await pause(Math.min(MAX_DELAY_MS, 50 * 2 ** failures) * (0.5 + 0.5 * Math.random()));
+      if (failures) await pause(delay(failures));
       lost = new Error("the server ended the stream");
       const stream = client.Play().on("error", (error) => { if (error.code !== "ABORT_ERR") lost = error; }); // Node's own, after such an end.
       const commands = seats.map(({ ticket, next }) => ({ attach: { ticket, from_sequence: next } }));

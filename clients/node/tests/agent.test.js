@@ -45,7 +45,8 @@ async function serveWith({ token }, ...connections) {
     JoinRoom: ({ request }, done) => {
       joins.push(request);
       served.joining?.();
-      if (request.join_code === "TABLE") done(null, { seat: 2, ticket: "a ticket" });
+      if (served.failures?.length) done({ code: grpc.status[served.failures.shift()], details: "not now" });
+      else if (request.join_code === "TABLE") done(null, { seat: 2, ticket: "a ticket" });
       else done({ code: grpc.status.PERMISSION_DENIED, details: "no room has this join code" });
     },
   });
@@ -207,6 +208,26 @@ for (const code of [
   });
 }
 
+test("joining is repeated with the same request id, and so takes one seat", async () => {
+  const pauses = [];
+  const way = { code: "TABLE", name: "Ada", pause: async (ms) => { pauses.push(ms); } };
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  });
+  server.failures = ["UNAVAILABLE", "RESOURCE_EXHAUSTED"];
+  assert.deepEqual(await play({ address: server.address, ...way }), { seat: 2, standings: STANDINGS });
+  const ids = server.joins.map(({ request_id }) => request_id.toString("hex"));
+  assert.deepEqual([ids.length, new Set(ids).size, ids[0].length, pauses.length], [3, 1, 64, 2]);
+
+  for (const [failures, calls] of [[Array(9).fill("UNAVAILABLE"), 8], [["PERMISSION_DENIED"], 1]]) {
+    server.joins.length = 0;
+    server.failures = failures;
+    await assert.rejects(play({ address: server.address, ...way }), /not now/);
+    assert.equal(server.joins.length, calls);
+  }
+});
+
 test("a refused decision is answered again, and the seat is taken back from its substitute", async () => {
   const heard = [];
   const server = await serve(async (stream, read) => {
@@ -259,7 +280,7 @@ test("TLS with an authority of its own, and a token with every call", async () =
   await assert.rejects(play(way), /a token is needed/);
   await assert.rejects(play({ ...way, ticket: "a ticket" }), /a token is needed/);
   assert.equal(server.calls, 4, "refused once each");
-  await assert.rejects(play({ ...way, ca: undefined }), /self-signed certificate/);
+  await assert.rejects(play({ ...way, ca: undefined, pause: async () => {} }), /self-signed certificate/);
 });
 
 test("a connection that goes silent is replaced", async () => {
@@ -556,9 +577,7 @@ test("the process reports errors and exits with 1", async () => {
   assert.deepEqual(wrongCode, { status: 1, out: "", err: "agent: no room has this join code\n" });
 
   servers.pop().forceShutdown();
-  const nobodyThere = await run(["--address", address, "--code", "TABLE"]);
-  assert.equal(nobodyThere.status, 1);
-  assert.match(nobodyThere.err, /^agent: .*ECONNREFUSED/);
+  await assert.rejects(play({ address, code: "TABLE", name: "Ada", pause: async () => {} }), /ECONNREFUSED/);
 
   for (const two of [["--code", "TABLE", "--ticket", "kept"], ["--code", "TABLE", "--tournament", "CUP"], ["--ticket", "T", "--ticket-file", "F"]]) {
     const { status, err } = await run(["--address", address, ...two]);
