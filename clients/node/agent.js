@@ -187,42 +187,51 @@ export async function play({ ticket, ...way }) {
   return outcome;
 }
 
-/** Whether another process with this id is running. */
+/** Whether another process with this id is running. 0 is no id. */
 function runs(pid) {
   try {
-    return pid !== process.pid && process.kill(pid, 0); // A restarted container may reuse its own id.
+    return pid > 0 && pid !== process.pid && process.kill(pid, 0); // A restarted container may reuse its own id.
   } catch ({ code }) {
     return code === "EPERM";
   }
 }
 
 /**
- * Locks a ticket file during `use`, by a file next to it with the process id. The lock of a process that has ended is ignored. In a
- * read-only folder an existing ticket is used without a lock.
+ * Locks a ticket file during `use`, by a file next to it with the process id. The lock of a process that has ended, and one that is
+ * empty after a power cut, are ignored. In a read-only folder or on a full disk an existing ticket is used without a lock.
  */
 async function withLock(file, use) {
   const lock = file && beside(file, "lock");
-  const take = () => writeFileSync(lock, `${process.pid}`, { flag: "wx" });
+  const free = () => { try { rmSync(lock, { force: true }); } catch { /* The next process ignores it. */ } };
+  const take = () => {
+    try {
+      writeFileSync(lock, `${process.pid} ${BOOT}`, { flag: "wx" });
+    } catch (error) {
+      if (error.code !== "EEXIST") free();
+      throw error;
+    }
+  };
   if (!file) return use();
   try {
     take();
   } catch (error) {
     if (error.code !== "EEXIST" && existsSync(file)) return use();
     if (error.code !== "EEXIST") throw error;
-    const pid = Number(readFileSync(lock, "utf8"));
-    if (runs(pid)) throw new Error(`another agent uses ${file}; if process ${pid} is not an agent, remove ${lock}`);
+    const [pid, boot = BOOT] = readFileSync(lock, "utf8").split(" ");
+    if (boot === BOOT && runs(Number(pid))) throw new Error(`another agent uses ${file}; if process ${pid} is not an agent, remove ${lock}`);
     rmSync(lock, { force: true });
     take();
   }
   try {
     return await use();
   } finally {
-    try { rmSync(lock, { force: true }); } catch { /* The next process ignores it. */ }
+    free();
   }
 }
 
 const beside = (file, what) => path.join(path.dirname(file), `.${path.basename(file)}.${what}`);
 const stored = (file) => (file && existsSync(file) ? readFileSync(file, "utf8").trim() : "");
+const BOOT = stored("/proc/sys/kernel/random/boot_id"); // On Linux: process ids from before the last boot mean nothing.
 
 /** Returns the ticket in the file, or joins and stores or prints the new ticket. */
 async function ticketOf(file, way) {
@@ -241,7 +250,7 @@ async function ticketOf(file, way) {
     let how = `with --ticket ${ticket}`;
     if (file) {
       try {
-        writeFileSync(part, `${ticket}\n`);
+        writeFileSync(part, `${ticket}\n`, { flush: true });
         renameSync(part, file);
         how = `by the same command: the ticket is in ${file}`;
       } catch (error) { // The ticket exists nowhere else, so it is printed.

@@ -524,11 +524,19 @@ test("a second agent with the same ticket file is refused, and a stale lock is i
 
   const gone = spawn(process.execPath, ["--eval", ""]);
   await once(gone, "close");
-  await writeFile(join(folder, ".ticket.lock"), `${gone.pid}`);
   await writeFile(join(folder, ".ticket.new"), "left behind");
-  server.remaining.push(ending(tickets));
-  assert.equal((await run(args(server))).status, 0);
-  assert.deepEqual([tickets.length, await readdir(folder)], [2, []]);
+  // Of a process that has ended, half written, and of one before the machine was started again.
+  const stale = [`${gone.pid}`, "", "0", `${process.pid} another-boot`];
+  for (const lock of stale) {
+    await writeFile(join(folder, ".ticket.lock"), lock);
+    server.remaining.push(ending(tickets));
+    assert.equal((await run(args(server))).status, 0, lock);
+    assert.deepEqual(await readdir(folder), []);
+  }
+  assert.equal(tickets.length, 1 + stale.length);
+
+  await writeFile(join(folder, ".ticket.lock"), `${process.pid}`); // As earlier versions write it.
+  assert.match((await run(args(server))).err, /^agent: another agent uses /);
 });
 
 test("a ticket that cannot be stored is printed, and the game is played", async (context) => {
