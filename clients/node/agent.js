@@ -278,6 +278,12 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
   const own = { ticket: option(process.env.CHEFSHAT_TICKET), "ticket-file": option() };
   const where = { address: option("127.0.0.1:50051"), code: option(), tournament: option() };
   const access = { token: option(process.env.CHEFSHAT_TOKEN), ca: option(process.env.CHEFSHAT_CA) };
+  for (const signal of ["SIGINT", "SIGTERM"]) {
+    process.once(signal, () => { // As process 1, a container's program is not ended by a signal that it does not handle.
+      console.error("agent: stopped by a signal");
+      process.exit(1); // The ticket remains in its file.
+    });
+  }
   try {
     const { values } = parseArgs({ options: { ...where, ...access, ...own, name: option("Node"), games: option("1") } });
     const { ticket: given, "ticket-file": file, ...way } = values;

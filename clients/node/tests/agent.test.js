@@ -539,6 +539,18 @@ test("a second agent with the same ticket file is refused, and a stale lock is i
   assert.match((await run(args(server))).err, /^agent: another agent uses /);
 });
 
+for (const signal of ["SIGINT", "SIGTERM"]) {
+  test(`${signal} ends the process with 1`, async () => {
+    let agent;
+    const server = await serve(async (stream, read) => {
+      await read();
+      agent.kill(signal);
+    });
+    const { status, out, err } = await run(["--address", server.address, "--ticket", "kept"], {}, (started) => { agent = started; });
+    assert.deepEqual([status, out, err], [1, "", "agent: stopped by a signal\n"]);
+  });
+}
+
 test("a ticket that cannot be stored is printed, and the game is played", async (context) => {
   const folder = await folderOf(context);
   const file = join(folder, "ticket");
