@@ -68,6 +68,31 @@ def test_the_default_base_gets_what_jemalloc_is_built_with() -> None:
     assert "tikv-jemalloc-sys" not in (ROOT / "Cargo.lock").read_text() or "apk add --no-cache make" in stage
 
 
+#: Files with secrets that the pages of the book and the heads of the files in docker/ make.
+SECRETS = [
+    "chefshat-data/tokens.json",
+    "docker/.env",
+    "docker/peers/node.key",
+    "docker/tls/tls.key",
+    "keys/signing-key",
+    "keys/tokens.json",
+    "owner",
+    "privkey.pem",
+    "ada.ticket",
+]
+
+
+def test_secrets_stay_out_of_commits_and_images() -> None:
+    assert run(["git", "check-ignore", "--no-index", *SECRETS]).splitlines() == SECRETS
+
+    def patterns(file: str, prefix: str) -> list[str]:
+        section = (ROOT / file).read_text().split("# Secrets.\n")[1].split("!/tests/fixtures/**")[0]
+        return [line.removeprefix(prefix) for line in section.splitlines()]
+
+    # A pattern without a slash holds in all folders for Git alone.
+    assert patterns("docker/Dockerfile.dockerignore", "**/") == patterns(".gitignore", "")
+
+
 def check(images: Images, server_image: str, agent_image: str) -> None:
     """Plays a game on a server of an image, with an agent of another; stops the server and looks at its data."""
     configuration = images.configuration(server_image)
