@@ -236,6 +236,22 @@ def test_every_reason_is_needed_and_names_files_that_exist() -> None:
         assert (ROOT / path).exists(), path
 
 
+@pytest.mark.parametrize("backup_fails", [True, False])
+def test_old_backups_are_deleted_only_after_a_new_one(tmp_path: Path, backup_fails: bool) -> None:
+    page = (ROOT / "docs/operating.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"^15 3 \* \* \* chefshat (.*)$", page, re.MULTILINE)
+    old = tmp_path / "2026-01-01"
+    old.mkdir()
+    os.utime(old, (0, 0))
+    program = tmp_path / "bin/chefshat"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\nexit {int(backup_fails)}\n")
+    program.chmod(0o755)
+    command = line.replace("\\%", "%").replace("/var/backups/chefshat", str(tmp_path))
+    subprocess.run(["sh", "-c", command], env={"PATH": f"{program.parent}:{os.environ['PATH']}"}, timeout=PATIENCE_S)
+    assert old.exists() == backup_fails
+
+
 def test_no_command_is_hidden_in_a_block_of_another_language() -> None:
     for page in PAGES:
         text = (ROOT / page).read_text(encoding="utf-8")
