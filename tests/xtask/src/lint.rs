@@ -171,6 +171,7 @@ pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failur
         "docker/kubernetes/chefshat.yaml",
         "docker/kubernetes/cluster.yaml",
         "docker/kubernetes/ingress.yaml",
+        "docker/kubernetes/migrate.yaml",
     ];
     steps.program(
         "kubernetes-validate",
