@@ -13,6 +13,9 @@ const WAITS: [&str; 3] = [
     "TimeoutStopSec=",
 ];
 
+/// What follows the seconds by which a shutdown may be longer than the grace.
+const LONGER: [&str; 2] = [" s longer than --grace", " s more than CHEFSHAT_GRACE"];
+
 /// The files that run a server.
 const EXAMPLES: [&str; 5] = [
     "compose.cluster.yaml",
@@ -32,8 +35,16 @@ fn waits(text: &str) -> Vec<Duration> {
         .collect()
 }
 
+/// The seconds by which a shutdown may be longer than the grace, in sentences.
+fn said(text: &str) -> Vec<u64> {
+    let found = LONGER.iter().flat_map(|words| text.match_indices(words));
+    let seconds = found.map(|(at, _)| text[..at].rsplit(' ').next().unwrap_or_default().parse());
+    seconds.map(|seconds| seconds.expect("seconds")).collect()
+}
+
 fn search(folder: &Path, root: &Path, found: &mut BTreeSet<String>) {
-    let longest = longest_shutdown(ServerConfig::default().grace);
+    let grace = ServerConfig::default().grace;
+    let longest = longest_shutdown(grace);
     for entry in std::fs::read_dir(folder).expect("it exists") {
         let path = entry.expect("readable").path();
         if path.is_dir() {
@@ -62,6 +73,10 @@ fn search(folder: &Path, root: &Path, found: &mut BTreeSet<String>) {
                 *wait > longest,
                 "{name}: {wait:?}, but a shutdown takes {longest:?}"
             );
+        }
+        for seconds in said(&text) {
+            let longer = (longest - grace).as_secs();
+            assert_eq!(seconds, longer, "{name}");
         }
         if !waits.is_empty() {
             found.insert(name);
