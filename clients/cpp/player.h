@@ -99,6 +99,8 @@ struct Seat {
   // The answer to the last decision, and an action that is certainly legal.
   v1::Answer answer;
   uint32_t default_action = 0;
+  // Whether the game is over, with a result or without.
+  bool over = false;
   v1::GameEnded result;
   // Why there is no result; empty if there is one.
   std::string error = "the game has no result";
@@ -171,6 +173,10 @@ class Player {
     });
     if (seat == seats_.end()) {
       if (ticket.empty()) return;  // Its game is over.
+      if (is_over(update.attached().game_id())) {
+        command(update.handle()).mutable_detach();
+        return;
+      }
       // First: the participant attaches last, so that the server does not add these seats again.
       seat = seats_.emplace(seats_.begin());
       seat->ticket = ticket;
@@ -184,18 +190,25 @@ class Player {
     for (const v1::GameEvent& event : update.events().events()) observe(*seat, event);
     // A snapshot stands for events that the room no longer has.
     seat->next_event = std::max(seat->next_event, update.snapshot().next_sequence());
-    if (update.substitution().active()) command(*seat).mutable_resume();
+    if (update.substitution().active()) command(seat->handle).mutable_resume();
     if (update.has_decision()) decide(*seat, update.decision());
     if (update.has_result()) acknowledge(*seat, update.result());
     if (update.has_refused()) refuse(seat, update.refused());
     if (update.has_detached()) detach(seat, update.detached().reason());
   }
 
+  // A game that ended just before the connection was lost may not have been counted yet.
+  bool is_over(const std::string& game_id) const {
+    return std::any_of(finished_.begin(), finished_.end(),
+                       [&](const Seat& seat) { return seat.over && seat.game_id == game_id; });
+  }
+
   void observe(Seat& seat, const v1::GameEvent& event) {
     seat.next_event = event.sequence() + 1;
     if (event.has_substituted() && event.substituted().seat() == seat.number) {
-      command(seat).mutable_resume();
+      command(seat.handle).mutable_resume();
     }
+    seat.over |= event.has_game_ended() || event.has_game_aborted();
     if (event.has_game_aborted()) {
       seat.error += " (" + v1::AbortReason_Name(event.game_aborted().reason()) + ")";
     }
@@ -213,7 +226,7 @@ class Player {
       seat.answer.set_action(choose_(request));
     }
     seat.default_action = request.default_action();
-    *command(seat).mutable_answer() = seat.answer;
+    *command(seat.handle).mutable_answer() = seat.answer;
   }
 
   // After INVALID the decision is still open and is not requested again.
@@ -221,12 +234,12 @@ class Player {
     if (result.status() != v1::ANSWER_STATUS_INVALID) return;
     if (result.decision_id() != seat.answer.decision_id()) return;
     seat.answer.set_action(seat.default_action);
-    *command(seat).mutable_answer() = seat.answer;
+    *command(seat.handle).mutable_answer() = seat.answer;
   }
 
-  v1::SeatCommand& command(const Seat& seat) {
+  v1::SeatCommand& command(uint32_t handle) {
     v1::SeatCommand& command = *commands_.add_commands();
-    command.set_handle(seat.handle);
+    command.set_handle(handle);
     return command;
   }
 
@@ -249,10 +262,13 @@ class Player {
     }
   }
 
-  // A tournament continues without a seat that the server had added.
+  // A tournament continues without a seat that the server had added. The ticket of a game that is
+  // over may be unknown soon.
   void lose(SeatIterator seat, const std::string& error) {
-    if (seat->ticket == ticket_) throw Failure(error);
-    seat->error = error;
+    if (!seat->over) {
+      if (seat->ticket == ticket_) throw Failure(error);
+      seat->error = error;
+    }
     finished_.splice(finished_.end(), seats_, seat);
   }
 

@@ -1,12 +1,15 @@
 //! One game of four processes in four languages, against the binary over its port; and what is tested
-//! of the agent in C++ alone: its ticket file, signals, TLS and tokens.
+//! of the agent in C++ alone: its ticket file, signals, TLS, tokens, and games that end when the
+//! connection is lost.
 
+use std::collections::VecDeque;
 use std::path::Path;
 use std::process::{Output, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use chefshat_client::{Client, ConnectOptions};
-use chefshat_proto::v1;
+use chefshat_proto::v1::play_service_server::{PlayService, PlayServiceServer};
+use chefshat_proto::v1::{self, seat_command::Command as Sent, seat_update::Update};
 use chefshat_record::{jsonl, replay};
 use chefshat_server::access::{AccessSettings, Mode, NewToken, Role, TokenFile};
 use chefshat_server::config::ServerConfig;
@@ -17,7 +20,11 @@ use chefshat_tests::{
 };
 use serde_json::Value;
 use tokio::io::{AsyncBufReadExt as _, BufReader};
+use tokio::net::TcpListener;
 use tokio::process::Command;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
+use tonic::{Request, Response, Status, Streaming};
 
 /// Runs a program and returns its output.
 async fn output_of(name: &str, mut command: Command) -> Output {
@@ -278,4 +285,186 @@ async fn an_agent_in_cpp_shows_its_token_over_tls() {
     let output = participant("with a token", with_token).await;
     let result: Value = serde_json::from_slice(&output.stdout).expect("a JSON line");
     assert_eq!(result["seat"], 0);
+}
+
+/// The messages of a stream: updates with their handles.
+type Script = Vec<Vec<(u32, Update)>>;
+
+/// A server without rules and rooms. Each stream sends the next of the scripts after its first
+/// request; all but the last then break.
+#[derive(Clone, Default)]
+struct Scripted {
+    scripts: Arc<Mutex<VecDeque<Script>>>,
+    /// All commands of agents but attachments, with their handles.
+    heard: Arc<Mutex<Vec<(u32, Sent)>>>,
+}
+
+impl Scripted {
+    /// Serves on a free port. Returns its address.
+    async fn start(&self) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener.local_addr().expect("bound").to_string();
+        let service = PlayServiceServer::new(self.clone());
+        let server = tonic::transport::Server::builder().add_service(service);
+        tokio::spawn(server.serve_with_incoming(TcpListenerStream::new(listener)));
+        address
+    }
+
+    async fn hear(&self, requests: &mut Streaming<v1::PlayRequest>) -> bool {
+        let Ok(Some(request)) = requests.message().await else {
+            return false;
+        };
+        let commands = (request.commands.into_iter())
+            .filter_map(|it| Some((it.handle, it.command?)))
+            .filter(|(_, command)| !matches!(command, Sent::Attach(_)));
+        self.heard.lock().expect("no panic").extend(commands);
+        true
+    }
+}
+
+impl PlayService for Scripted {
+    type PlayStream = ReceiverStream<Result<v1::PlayResponse, Status>>;
+    type WatchStream = tokio_stream::Empty<Result<v1::PlayServiceWatchResponse, Status>>;
+
+    async fn play(
+        &self,
+        request: Request<Streaming<v1::PlayRequest>>,
+    ) -> Result<Response<Self::PlayStream>, Status> {
+        let mut scripts = self.scripts.lock().expect("no panic");
+        let script = scripts
+            .pop_front()
+            .ok_or_else(|| Status::not_found("no script is left"))?;
+        let is_last = scripts.is_empty();
+        let (messages, queue) = mpsc::channel(script.len());
+        let (server, mut requests) = (self.clone(), request.into_inner());
+        tokio::spawn(async move {
+            server.hear(&mut requests).await;
+            for updates in script {
+                let updates = (updates.into_iter()).map(|(handle, update)| v1::SeatUpdate {
+                    handle,
+                    update: Some(update),
+                });
+                let message = v1::PlayResponse {
+                    updates: updates.collect(),
+                };
+                messages
+                    .send(Ok(message))
+                    .await
+                    .expect("there is space for all");
+            }
+            while is_last && server.hear(&mut requests).await {}
+        });
+        Ok(Response::new(ReceiverStream::new(queue)))
+    }
+
+    async fn watch(
+        &self,
+        _request: Request<v1::PlayServiceWatchRequest>,
+    ) -> Result<Response<Self::WatchStream>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    async fn act(&self, _: Request<v1::ActRequest>) -> Result<Response<v1::ActResponse>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+}
+
+/// `ticket`: of a seat that the server adds.
+fn attached(ticket: &str) -> Update {
+    Update::Attached(v1::Attached {
+        seat: 2,
+        game_id: "game".to_owned(),
+        ticket: ticket.to_owned(),
+        ..v1::Attached::default()
+    })
+}
+
+fn game_ended() -> Update {
+    let standing = v1::Standing {
+        seat: 2,
+        points: 15,
+        place: 1,
+    };
+    let ended = v1::GameEnded {
+        standings: vec![standing],
+        ..v1::GameEnded::default()
+    };
+    let event = v1::GameEvent {
+        sequence: 1,
+        kind: Some(v1::game_event::Kind::GameEnded(Box::new(ended))),
+        ..v1::GameEvent::default()
+    };
+    Update::Events(v1::EventBatch {
+        events: vec![event],
+    })
+}
+
+fn detached(reason: v1::DetachReason) -> Update {
+    Update::Detached(v1::Detached {
+        reason: reason.into(),
+    })
+}
+
+#[tokio::test]
+async fn an_agent_in_cpp_keeps_the_results_of_games_that_are_over_when_the_connection_is_lost() {
+    let refused = Update::Refused(v1::Refused {
+        code: tonic::Code::Unauthenticated as u32,
+        reason: "TICKET_UNKNOWN".to_owned(),
+        ..v1::Refused::default()
+    });
+    for gone in [refused, detached(v1::DetachReason::Superseded)] {
+        let server = Scripted::default();
+        let scripts = [
+            vec![vec![(0, attached(""))], vec![(0, game_ended())]],
+            vec![vec![(0, gone)]],
+        ];
+        server.scripts.lock().expect("no panic").extend(scripts);
+        let agent = agent_in_cpp(&server.start().await, &["--ticket", "kept"]);
+        let output = participant("an agent", agent).await;
+        let result: Value = serde_json::from_slice(&output.stdout).expect("a JSON line");
+        assert_eq!(result["standings"][0]["points"], 15);
+    }
+
+    // A tournament that has not counted the game yet seats its participant again.
+    const ADDED: u32 = 1 << 31;
+    let entered = || {
+        (
+            0,
+            Update::Entered(v1::Entered {
+                participant: 5,
+                ..v1::Entered::default()
+            }),
+        )
+    };
+    let server = Scripted::default();
+    server.scripts.lock().expect("no panic").extend([
+        vec![
+            vec![entered(), (ADDED, attached("of the seat"))],
+            vec![
+                (ADDED, game_ended()),
+                (ADDED, detached(v1::DetachReason::GameOver)),
+            ],
+        ],
+        vec![
+            vec![
+                entered(),
+                (ADDED, attached("of the seat")),
+                (ADDED, game_ended()),
+            ],
+            vec![
+                (ADDED, detached(v1::DetachReason::Requested)),
+                (0, detached(v1::DetachReason::TournamentOver)),
+            ],
+        ],
+    ]);
+    let agent = agent_in_cpp(&server.start().await, &["--ticket", "cup"]);
+    let output = participant("an agent", agent).await;
+    let result: Value = serde_json::from_slice(&output.stdout).expect("a JSON line");
+    assert_eq!(
+        result["games"].as_array().map(Vec::len),
+        Some(1),
+        "{result}"
+    );
+    let heard = server.heard.lock().expect("no panic").clone();
+    assert_eq!(heard, [(ADDED, Sent::Detach(v1::Detach {}))]);
 }
