@@ -52,10 +52,12 @@ struct Server {
       std::cerr << "warning: the token is sent unencrypted; use https://" << target << std::endl;
     }
     grpc::ChannelArguments arguments;
-    // Finds a dead connection before a decision is lost. Without the last of these only two pings
-    // are sent while the stream is silent.
+    // Finds a dead connection before a decision is lost. Newer versions of gRPC wait a minute for
+    // the answer to a ping without the third of these; without the last, only two pings are sent
+    // while the stream is silent.
     arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 3000);
     arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 5000);
+    arguments.SetInt("grpc.http2.ping_timeout_ms", 5000);
     arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
     // Short, because `call` pauses too.
     arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
