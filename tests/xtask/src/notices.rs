@@ -1,4 +1,4 @@
-//! The licences of what releases contain: crates, packages of the page, fonts.
+//! The licences of what releases contain: crates, packages of the page, fonts, libraries.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -12,8 +12,21 @@ use crate::failure::Failure;
 use crate::places::Places;
 use crate::setup::at;
 
-/// The licence of the fonts of pictures.
-const FONTS: &str = "server/assets/font/OFL.txt";
+/// The licences of what is no package, with what they are of: the fonts of pictures, and what every
+/// static program contains.
+const OTHERS: [(&str, &str); 3] = [
+    (
+        "server/assets/font/OFL.txt",
+        "Atkinson Hyperlegible Next (OFL-1.1)",
+    ),
+    ("docker/archive/licences/musl.txt", "musl (MIT)"),
+    (
+        "docker/archive/licences/rust.txt",
+        "Rust's standard library (MIT OR Apache-2.0)",
+    ),
+];
+/// Those of what crates contain of others.
+const WITHIN: [&str; 2] = ["jemalloc/COPYING", "third_party/fiat/LICENSE"];
 /// How the names of files with licences begin, in capitals.
 const LICENCES: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE"];
 
@@ -31,8 +44,6 @@ struct Part {
 /// The notices of the programs and of the Python module, for a target. The packages of the page must
 /// be set up.
 pub(crate) fn notices(places: &Places, target: &str) -> Result<String, Failure> {
-    let fonts = places.root.join(FONTS);
-    let fonts = fs::read_to_string(&fonts).map_err(|error| at(&fonts, &error))?;
     let mut text =
         "What chefshat, chefshat-lab and chefshat_native contain of others, and its licences.\n"
             .to_owned();
@@ -52,7 +63,13 @@ pub(crate) fn notices(places: &Places, target: &str) -> Result<String, Failure> 
             add(licence, &heading);
         }
     }
-    add(fonts, "Atkinson Hyperlegible Next (OFL-1.1)");
+    for (file, heading) in OTHERS {
+        let file = places.root.join(file);
+        add(
+            fs::read_to_string(&file).map_err(|error| at(&file, &error))?,
+            heading,
+        );
+    }
     for (licence, of) in by_words.into_values() {
         let of = of.into_iter().collect::<Vec<_>>().join(", ");
         let line = "-".repeat(80);
@@ -142,14 +159,16 @@ fn of<'a>(package: &'a Value, key: &str) -> &'a str {
 /// The texts of the licences in a folder. Where there is none, the name of the licence must do.
 fn licences(folder: &Path) -> Result<Vec<String>, Failure> {
     let files = fs::read_dir(folder).map_err(|error| at(folder, &error))?;
-    let mut texts = Vec::new();
-    for file in files.filter_map(Result::ok) {
+    let own = files.filter_map(Result::ok).filter_map(|file| {
         let name = file.file_name().to_string_lossy().to_uppercase();
-        if LICENCES.iter().any(|begin| name.starts_with(begin)) && file.path().is_file() {
-            texts.push(fs::read_to_string(file.path()).map_err(|error| at(&file.path(), &error))?);
-        }
-    }
-    Ok(texts)
+        let is_licence = LICENCES.iter().any(|begin| name.starts_with(begin));
+        is_licence.then(|| file.path())
+    });
+    let within = WITHIN.iter().map(|path| folder.join(path));
+    own.chain(within)
+        .filter(|file| file.is_file())
+        .map(|file| fs::read_to_string(&file).map_err(|error| at(&file, &error)))
+        .collect()
 }
 
 #[test]
@@ -158,4 +177,22 @@ fn the_licences_of_a_package_are_found_by_the_names_of_their_files() {
     let found = licences(&root).unwrap();
     assert_eq!(found, [fs::read_to_string(root.join("LICENSE")).unwrap()]);
     assert!(licences(&root.join("docs")).unwrap().is_empty());
+}
+
+#[test]
+fn the_licence_of_a_library_inside_a_package_is_found() {
+    let folder = std::env::temp_dir().join(format!("xtask-licences-{}", std::process::id()));
+    fs::create_dir_all(folder.join("jemalloc")).unwrap();
+    fs::write(folder.join("LICENSE-MIT"), "the binding").unwrap();
+    fs::write(folder.join("jemalloc/COPYING"), "the library").unwrap();
+    assert_eq!(licences(&folder).unwrap(), ["the binding", "the library"]);
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn the_licences_of_libraries_and_fonts_are_there() {
+    let root = Places::find().unwrap().root;
+    for (file, _) in OTHERS {
+        assert!(root.join(file).is_file(), "{file}");
+    }
 }
