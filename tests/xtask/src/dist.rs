@@ -10,7 +10,7 @@ use std::process::Command;
 use crate::book;
 use crate::command::{cargo, git, python_command, read, run as run_command, succeeds};
 use crate::failure::Failure;
-use crate::notices::{FILE as NOTICES, notices};
+use crate::notices::{FEATURE, FILE as NOTICES, notices};
 use crate::places::{DEPLOYMENT, Places};
 use crate::setup::{self, at};
 use crate::steps::Steps;
@@ -353,7 +353,8 @@ impl Release<'_> {
             .arg("--manifest-path");
         cyclonedx
             .arg(&manifest)
-            .args(["--format", "json", "--quiet", "--target"])
+            .args(["--features", FEATURE, "--format", "json", "--quiet"])
+            .arg("--target")
             .arg(wheels::static_target(self.host.processor));
         cyclonedx.args(["--override-filename", "contents"]);
         cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);

@@ -30,6 +30,9 @@ const WITHIN: [&str; 2] = ["jemalloc/COPYING", "third_party/fiat/LICENSE"];
 /// How the names of files with licences begin, in capitals.
 const LICENCES: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "COPYRIGHT", "NOTICE"];
 
+/// What the programs of a release are built with, beside what is always in them.
+pub(crate) const FEATURE: &str = "dist";
+
 /// The file that releases have them in.
 pub(crate) const FILE: &str = "NOTICES.txt";
 
@@ -90,7 +93,7 @@ fn crates(places: &Places, target: &str) -> Result<Vec<Part>, Failure> {
         "--package",
         "chefshat-lab",
         "--features",
-        "chefshat-lab/dist",
+        &format!("chefshat-lab/{FEATURE}"),
     ]);
     tree.args([
         "--edges", "normal", "--prefix", "none", "--format", "{p}", "--target", target,
