@@ -22,14 +22,20 @@ const MANY: usize = 256;
 /// Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
 
-/// Runs `work` for every game, advances those for which it returns true, and writes the rows.
-/// `waiting` has the buffers of the blocks. `step` is the number of the step: each begins with another
+/// What a block of games fills within a step. Between steps it is empty, but keeps its memory.
+#[derive(Debug, Default)]
+pub(super) struct Buffers {
+    waiting: Waiting,
+    part: Option<Part>,
+}
+
+/// Runs `work` for every game, advances those for which it returns true, and writes the rows. `step` is the number of the step: each begins with another
 /// game of each block, so that all advance, even if the limit is reached in every step.
 pub(super) fn run(
     slots: &mut [Slot],
     setup: &VectorSetup,
     pool: Option<&Arc<ThreadPool>>,
-    waiting: &mut Vec<Waiting>,
+    buffers: &mut Vec<Buffers>,
     step: u64,
     work: impl Fn(&mut Slot, &mut Part) -> bool + Sync,
 ) -> Part {
@@ -40,39 +46,42 @@ pub(super) fn run(
         false => (BLOCK, MANY),
     };
     let blocks = games.div_ceil(size);
-    waiting.resize_with(blocks, Waiting::default);
+    buffers.resize_with(blocks, Buffers::default);
     let budget = MAX_WORK_PER_STEP / blocks as u64;
-    let block = |(number, (slots, waiting)): (usize, (&mut [Slot], &mut Waiting))| {
-        // The others are appended to the first.
-        let rows = if number == 0 { games } else { slots.len() };
-        let mut part = Part::new(setup, rows, budget);
+    // The others are appended to the first, which becomes the result.
+    buffers[0].part = Some(Part::new(setup, games));
+    let block = |(slots, buffers): (&mut [Slot], &mut Buffers)| {
+        let Buffers { waiting, part } = buffers;
+        let part = part.get_or_insert_with(|| Part::new(setup, slots.len()));
+        part.budget = budget;
         let first = (step % slots.len() as u64) as usize;
         for place in (first..slots.len()).chain(0..first) {
             let slot = &mut slots[place];
-            if work(slot, &mut part) {
-                slot.advance(place, setup, &mut part, waiting);
+            if work(slot, part) {
+                slot.advance(place, setup, part, waiting);
             }
         }
         let network = |number| setup.network(number);
         waiting.take_all(network, |waiting, place, action| {
-            slots[place].advance_with(action, place, setup, &mut part, waiting);
+            slots[place].advance_with(action, place, setup, part, waiting);
         });
         part.batch.sort_by_game();
         for slot in slots {
-            slot.write_row(setup, &mut part);
+            slot.write_row(setup, part);
         }
-        part
     };
-    let whole = match pool {
+    match pool {
         Some(pool) if games > threads_from => {
-            let blocks = slots.par_chunks_mut(size).zip(waiting).enumerate();
-            let parts: Vec<Part> = pool.install(|| blocks.map(block).collect());
-            parts.into_iter().reduce(Part::append)
+            let blocks = slots.par_chunks_mut(size).zip(&mut *buffers);
+            pool.install(|| blocks.for_each(block));
         }
-        _ => {
-            let blocks = slots.chunks_mut(size).zip(waiting).enumerate();
-            blocks.map(block).reduce(Part::append)
-        }
-    };
-    whole.expect("there is at least one game")
+        _ => slots.chunks_mut(size).zip(&mut *buffers).for_each(block),
+    }
+    let mut parts = buffers.iter_mut();
+    let whole = parts.next().and_then(|first| first.part.take());
+    let mut whole = whole.expect("there is at least one game");
+    parts
+        .filter_map(|next| next.part.as_mut())
+        .for_each(|next| whole.append(next));
+    whole
 }

@@ -257,21 +257,28 @@ impl Batch {
         }
     }
 
-    /// Adds the tables of the games that follow.
-    pub(super) fn append(&mut self, next: Batch) {
-        self.rows += next.rows;
-        self.observations.append(next.observations);
-        self.endings.append(next.endings);
-        self.beginnings.append(next.beginnings);
-        self.shifts.append(next.shifts);
-        self.played.extend(next.played);
-        self.games.extend(next.games);
-        self.seats.extend(next.seats);
-        self.kinds.extend(next.kinds);
-        self.attempts.extend(next.attempts);
-        self.rewards.extend(next.rewards);
-        self.masks.extend(next.masks);
-        self.all_hands.extend(next.all_hands);
+    /// All columns of the open decisions but those of the observations.
+    fn columns(&mut self) -> [&mut Vec<u8>; 7] {
+        [
+            &mut self.games,
+            &mut self.seats,
+            &mut self.kinds,
+            &mut self.attempts,
+            &mut self.rewards,
+            &mut self.masks,
+            &mut self.all_hands,
+        ]
+    }
+
+    /// Takes over the tables of the games that follow.
+    pub(super) fn append(&mut self, next: &mut Batch) {
+        self.rows += std::mem::take(&mut next.rows);
+        append_columns(self.columns(), next.columns());
+        self.observations.append(&mut next.observations);
+        self.endings.append(&mut next.endings);
+        self.beginnings.append(&mut next.beginnings);
+        self.shifts.append(&mut next.shifts);
+        self.played.append(&mut next.played);
     }
 
     /// Sorts what happened by game, but not the rows of open decisions. What happened in a game keeps
@@ -338,8 +345,8 @@ impl ObservationColumns {
         ]
     }
 
-    /// Adds the rows of another table.
-    fn append(&mut self, mut next: ObservationColumns) {
+    /// Takes over the rows of another table.
+    fn append(&mut self, next: &mut ObservationColumns) {
         append_columns(self.columns(), next.columns());
     }
 
@@ -420,11 +427,11 @@ impl Endings {
         ]
     }
 
-    /// Adds the rows of another table.
-    fn append(&mut self, mut next: Endings) {
-        self.rows += next.rows;
+    /// Takes over the rows of another table.
+    fn append(&mut self, next: &mut Endings) {
+        self.rows += std::mem::take(&mut next.rows);
         append_columns(self.columns(), next.columns());
-        self.observations.append(next.observations);
+        self.observations.append(&mut next.observations);
     }
 
     /// Sorts the rows by game. Those of a game keep their order.
@@ -455,9 +462,9 @@ impl Beginnings {
         [&mut self.games, &mut self.indices, &mut self.seeds]
     }
 
-    /// Adds the rows of another table.
-    fn append(&mut self, mut next: Beginnings) {
-        self.rows += next.rows;
+    /// Takes over the rows of another table.
+    fn append(&mut self, next: &mut Beginnings) {
+        self.rows += std::mem::take(&mut next.rows);
         append_columns(self.columns(), next.columns());
     }
 
@@ -500,9 +507,9 @@ impl Shifts {
         ]
     }
 
-    /// Adds the rows of another table.
-    fn append(&mut self, mut next: Shifts) {
-        self.rows += next.rows;
+    /// Takes over the rows of another table.
+    fn append(&mut self, next: &mut Shifts) {
+        self.rows += std::mem::take(&mut next.rows);
         append_columns(self.columns(), next.columns());
     }
 
@@ -578,7 +585,7 @@ fn seat_or_none(seat: Option<Seat>) -> u8 {
     seat.map_or(NO_SEAT, |seat| seat.index() as u8)
 }
 
-/// Appends each column to its counterpart.
+/// Moves the rows of each column to its counterpart.
 fn append_columns<const N: usize>(columns: [&mut Vec<u8>; N], next: [&mut Vec<u8>; N]) {
     for (column, next) in columns.into_iter().zip(next) {
         column.append(next);

@@ -44,6 +44,7 @@ use std::sync::Arc;
 use chefshat_engine::ActionId;
 use rayon::ThreadPool;
 
+use blocks::Buffers;
 pub use columns::{
     Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals, kind_number,
 };
@@ -58,7 +59,6 @@ pub use situation::Situation;
 use slot::Slot;
 pub use start::{Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};
-use waiting::Waiting;
 
 /// Leaves a decision open, in place of an action: the next batch has it again, unchanged. For a
 /// client that decides for some seats first.
@@ -72,8 +72,8 @@ pub struct VectorGames {
     /// The rows of the last batch.
     open: Vec<OpenRow>,
     pool: Option<Arc<ThreadPool>>,
-    /// The buffers of each block of games. Empty between steps.
-    waiting: Vec<Waiting>,
+    /// Those of each block of games.
+    buffers: Vec<Buffers>,
     totals: Totals,
     step: u64,
 }
@@ -91,7 +91,7 @@ impl VectorGames {
             slots: Vec::with_capacity(setup.games() as usize),
             open: Vec::new(),
             pool,
-            waiting: Vec::new(),
+            buffers: Vec::new(),
             setup,
             totals: Totals::default(),
             step: 0,
@@ -141,8 +141,8 @@ impl VectorGames {
         }
         let (setup, open) = (&self.setup, std::mem::take(&mut self.open));
         let every_game = open.len() == self.slots.len();
-        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
+        let (pool, buffers, step) = (self.pool.as_ref(), &mut self.buffers, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, buffers, step, |slot, part| {
             let game = slot.number();
             let row = match every_game {
                 true => Some(game as usize),
@@ -275,8 +275,8 @@ impl VectorGames {
         first: impl Fn(&mut Slot, &VectorSetup, &mut Part) + Sync,
     ) -> Batch {
         let setup = &self.setup;
-        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
+        let (pool, buffers, step) = (self.pool.as_ref(), &mut self.buffers, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, buffers, step, |slot, part| {
             let advances = games.binary_search(&slot.number()).is_ok();
             if advances {
                 first(slot, setup, part);
@@ -290,8 +290,8 @@ impl VectorGames {
         let setup = &self.setup;
         self.slots.clear();
         self.slots.extend((0..setup.games()).map(Slot::new));
-        let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
-        let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
+        let (pool, buffers, step) = (self.pool.as_ref(), &mut self.buffers, self.step);
+        let part = blocks::run(&mut self.slots, setup, pool, buffers, step, |slot, part| {
             slot.begin(setup, part);
             true
         });

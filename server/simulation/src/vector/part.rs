@@ -36,20 +36,20 @@ pub(super) struct Part {
 }
 
 impl Part {
-    pub(super) fn new(setup: &VectorSetup, rows: usize, budget: u64) -> Part {
+    /// Of no game so far, with capacity for this number of rows.
+    pub(super) fn new(setup: &VectorSetup, rows: usize) -> Part {
         Part {
             batch: Batch::new(setup, rows),
             totals: Totals::default(),
-            budget,
+            budget: 0,
             open: Vec::with_capacity(rows),
         }
     }
 
-    /// Adds what happened in the games that follow.
-    pub(super) fn append(mut self, next: Part) -> Part {
-        self.batch.append(next.batch);
-        self.totals.add(&next.totals);
-        self.open.extend(next.open);
-        self
+    /// Takes over what happened in the games that follow.
+    pub(super) fn append(&mut self, next: &mut Part) {
+        self.batch.append(&mut next.batch);
+        self.totals.add(&std::mem::take(&mut next.totals));
+        self.open.append(&mut next.open);
     }
 }
