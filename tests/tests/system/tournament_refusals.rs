@@ -1,12 +1,40 @@
 //! Invalid settings and forbidden actions of tournaments: refused with a reason and the field at
 //! fault.
 
-use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
+use chefshat_proto::v1::{
+    self, room_service_client::RoomServiceClient,
+    tournament_service_client::TournamentServiceClient,
+};
 use chefshat_tests::TestServer;
 use tonic::Code;
 use tonic_types::StatusExt as _;
 
+use crate::records::reason;
 use crate::tournaments::{create, id_of};
+
+#[tokio::test]
+async fn who_asks_for_a_room_with_the_code_of_a_tournament_has_not_tried_a_wrong_code() {
+    let server = TestServer::start().await;
+    let channel = server.channel().await;
+    let settings = v1::TournamentSettings {
+        name: "Coppa".into(),
+        format: v1::TournamentFormat::Swiss.into(),
+        ..v1::TournamentSettings::default()
+    };
+    let created = create(&mut TournamentServiceClient::new(channel.clone()), settings).await;
+    let mut rooms = RoomServiceClient::new(channel);
+    // More than may be wrong at once.
+    for _ in 0..300 {
+        let refused = rooms
+            .get_room(v1::GetRoomRequest {
+                join_code: created.join_code.clone(),
+                ..v1::GetRoomRequest::default()
+            })
+            .await
+            .expect_err("no room has it");
+        assert_eq!(reason(&refused), "JOIN_CODE_WRONG");
+    }
+}
 
 #[tokio::test]
 async fn invalid_requests_are_refused_with_the_field() {

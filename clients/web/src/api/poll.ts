@@ -13,6 +13,8 @@ export interface Polled<T> {
 
 /** Longest wait after errors, as a multiple of the interval. */
 const MAX_SLOWDOWN = 8;
+/** The server counts wrong codes, for everybody behind the same address: one is sent once. */
+const FINAL_REASON = "JOIN_CODE_WRONG";
 
 /**
  * The latest response to `ask`, which runs every `everyMs` milliseconds and at once when `key`
@@ -44,6 +46,7 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
         slowdown = Math.min(MAX_SLOWDOWN, slowdown * 2);
         const fault = faultOf(error);
         setPolled((before) => ({ ...before, fault }));
+        if (fault.reason === FINAL_REASON) return;
       }
       asking = false;
       next();

@@ -2,7 +2,7 @@
 // goes straight to it.
 
 import { useEffect, useState } from "preact/hooks";
-import { faultOf, wordsOf } from "../api/faults";
+import { faultOf, needsToken, wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { languageOf, t } from "../i18n";
@@ -46,22 +46,24 @@ export function Join({ route }: PageProps<"join">) {
 /** The room behind the code and the form to join it, or why it cannot be joined. */
 function WayIn({ code }: { code: string }) {
   const words = t().lobby.join;
-  const { value: found } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
-  if (found === null) return <p class="soft">{t().common.loading}</p>;
-  if (found.kind === "nothing") {
+  const { value: found, fault } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
+  if (fault?.reason === "JOIN_CODE_WRONG") {
     return (
       <>
         <p>
           {words.codeIs} <span class={css.code}>{code}</span>
         </p>
-        <Notice kind="fault">{t().faults.byReason.JOIN_CODE_WRONG}</Notice>
+        <Notice kind="fault">{wordsOf(fault)}</Notice>
         <JoinForm />
       </>
     );
   }
-  if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
-  if (found.kind === "refused") return <Notice kind="fault">{wordsOf(found.fault)}</Notice>;
-  const room = found.kind === "room" ? found.room : undefined;
+  if (!found && fault && (needsToken(fault) || fault.reason === "TOO_MANY_WRONG_CODES")) {
+    return <Notice kind="fault">{wordsOf(fault)}</Notice>;
+  }
+  if (found?.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
+  if (!found && !fault) return <p class="soft">{t().common.loading}</p>;
+  const room = found?.room;
   return (
     <>
       {room && (

@@ -110,6 +110,11 @@ impl Lookup {
         }
     }
 
+    /// Whether a tournament of this node has a join code.
+    pub(super) fn is_code_of_tournament(&self, join_code: &str) -> bool {
+        self.tournaments.by_code(join_code).is_some()
+    }
+
     /// Checks that no other node has created a room or tournament for this request before.
     pub(super) async fn check_not_created_elsewhere(
         &self,

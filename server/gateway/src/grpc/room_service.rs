@@ -74,7 +74,8 @@ impl RoomCalls {
     }
 
     /// The room with a join code; if an id is given too, it must match. Wrong codes are charged,
-    /// those of unknown rooms too: whether a room is private or unknown makes no difference.
+    /// those of unknown rooms too: whether a room is private or unknown makes no difference. That of
+    /// a tournament is not: who has a code does not know what it belongs to, and asks for a room first.
     async fn find_by_code(
         &self,
         caller: &Caller,
@@ -95,7 +96,9 @@ impl RoomCalls {
         let has_code =
             |handle: &Handle| (by_code.as_ref()).is_some_and(|it| it.id() == handle.id());
         let Some(handle) = found.filter(has_code) else {
-            self.calls.wrong_code(key);
+            if !self.lookup().is_code_of_tournament(join_code) {
+                self.calls.wrong_code(key);
+            }
             if !room_id.is_empty() {
                 self.lookup().room(caller, room_id).await?;
             }
