@@ -1,4 +1,5 @@
-// The page that an invitation opens: what a code belongs to, and how often it is asked for.
+// The pages that an invitation opens: what a code belongs to, how often it is asked for, and a
+// tournament that only its code shows.
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
@@ -6,12 +7,15 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi, tournamentApi } from "../src/api/client";
-import { RoomState } from "../src/gen/chefshat/v1/room_pb";
+import { RoomState, Visibility } from "../src/gen/chefshat/v1/room_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
+import { GetTournamentResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { t } from "../src/i18n";
 import { Join } from "../src/lobby/Join";
 import { forgetAll } from "../src/store";
+import { TournamentPage } from "../src/tournaments/TournamentPage";
 import { root } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
@@ -22,6 +26,15 @@ const refused = (reason: string) =>
 const notReached = () => new ConnectError("away", Code.Unavailable);
 const room = () =>
   create(GetRoomResponseSchema, { room: { roomId: ID, name: "Table one", state: RoomState.WAITING, seats: [{}] } });
+const tournament = () =>
+  create(GetTournamentResponseSchema, {
+    tournament: create(TournamentSchema, {
+      tournamentId: ID,
+      state: TournamentState.OPEN,
+      settings: { name: "Club evening", policy: { visibility: Visibility.PRIVATE } },
+    }),
+  });
+
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
 });
@@ -68,4 +81,41 @@ test("while the server is away, the room that was found stays, and one that was 
   expect(root.querySelector('[data-part~="join-room"]')).toBeNull();
   await pass(60_000);
   expect(root.querySelector('[data-part~="join-room"]')?.textContent).toContain("Table one");
+});
+
+async function openTournament(search: string) {
+  history.replaceState(null, "", `/tournaments/${ID}${search}`);
+  vi.spyOn(tournamentApi, "followTournament").mockImplementation(() => {
+    throw refused("TOURNAMENT_UNKNOWN");
+  });
+  await act(() => render(<TournamentPage route={{ page: "tournament", tournamentId: ID }} />, root));
+  await pass(0);
+}
+
+test("a private tournament is shown to those who bring its code, who can join it", async () => {
+  const asked = vi.spyOn(tournamentApi, "getTournament").mockResolvedValue(tournament());
+  await openTournament(`?code=${CODE}`);
+  expect(asked.mock.calls[0]?.[0]).toEqual({ joinCode: CODE });
+  expect(root.querySelector("h1")?.textContent).toBe("Club evening");
+  expect(root.querySelector("form")?.textContent).toContain(t().tournaments.join.submit);
+});
+
+test("without a code, or with a wrong one, a private tournament is not shown", async () => {
+  const asked = vi.spyOn(tournamentApi, "getTournament").mockRejectedValue(refused("JOIN_CODE_WRONG"));
+  await openTournament("");
+  expect(asked).not.toHaveBeenCalled();
+  expect(root.textContent).toContain(t().faults.byReason.TOURNAMENT_UNKNOWN);
+  await act(() => render(null, root));
+  await openTournament(`?code=${CODE}`);
+  await pass(600_000);
+  expect(asked).toHaveBeenCalledTimes(1);
+  expect(root.textContent).toContain(t().faults.byReason.JOIN_CODE_WRONG);
+});
+
+test("the code of another tournament does not show this one", async () => {
+  const other = tournament();
+  if (other.tournament) other.tournament.tournamentId = "0".repeat(32);
+  vi.spyOn(tournamentApi, "getTournament").mockResolvedValue(other);
+  await openTournament(`?code=${CODE}`);
+  expect(root.textContent).toContain(t().faults.byReason.TOURNAMENT_UNKNOWN);
 });

@@ -3,13 +3,16 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
+import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { wordsOf } from "../api/faults";
+import { usePolled } from "../api/poll";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { languageOf, t } from "../i18n";
+import { canonical } from "../lobby/seat";
 import { WhichOne } from "../lobby/WhichOne";
 import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { isWall, type PageProps, pathOf, readdress } from "../router";
+import { isWall, navigate, type PageProps, pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
 import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
@@ -33,6 +36,9 @@ import tournamentsCss from "./Tournaments.module.css";
 import { Wall } from "./Wall";
 import { dealsWords, inShort, playWords, TournamentStateChip } from "./words";
 
+/** Polling interval of a private tournament before joining, milliseconds. */
+const INVITED_EVERY_MS = 4_000;
+
 /** The page. */
 export function TournamentPage({ route }: PageProps<"tournament">) {
   // Before anything is requested: a private tournament is shown only to those who have a place.
@@ -47,13 +53,24 @@ export function TournamentPage({ route }: PageProps<"tournament">) {
     };
     return <WhichOne {...{ held, brought, decide }} words={t().tournaments.part.which} />;
   }
-  return followed ? <Followed followed={followed} wall={isWall(route)} /> : null;
+  return followed ? <Followed followed={followed} tournamentId={tournamentId} wall={isWall(route)} /> : null;
 }
 
-function Followed({ followed, wall }: { followed: FollowedTournament; wall: boolean }) {
+interface FollowedProps {
+  followed: FollowedTournament;
+  tournamentId: string;
+  wall: boolean;
+}
+
+function Followed({ followed, tournamentId, wall }: FollowedProps) {
   const { live, following } = followed;
   const { link, fault } = following;
-  if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
+  if (link.value === "failed") {
+    const code = invitedWith();
+    // A private tournament is followed only by its participants. Its code shows it to those who may join.
+    if (!wall && code && fault.value?.reason === "TOURNAMENT_UNKNOWN") return <Invited {...{ tournamentId, code }} />;
+    return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
+  }
   if (!live.value) return <p class="soft">{t().common.loading}</p>;
   const lost = link.value === "lost" && <Notice kind="fault">{t().tournaments.part.lost}</Notice>;
   if (wall) {
@@ -72,13 +89,46 @@ function Followed({ followed, wall }: { followed: FollowedTournament; wall: bool
   );
 }
 
+/** The join code of the address; null without one. */
+function invitedWith(): string | null {
+  return new URLSearchParams(location.search).get("code");
+}
+
+/** A private tournament, shown to somebody who is invited. */
+function Invited({ tournamentId, code }: { tournamentId: string; code: string }) {
+  const ask = async (signal: AbortSignal) => {
+    // The code alone: with the id of a private tournament, the server would not say that the code is wrong.
+    const call = { signal, timeoutMs: CALL_LIMIT_MS };
+    return (await tournamentApi.getTournament({ joinCode: canonical(code) }, call)).tournament;
+  };
+  const { value: tournament, fault } = usePolled(ask, INVITED_EVERY_MS, code);
+  const reasons = t().faults.byReason;
+  if (fault && (!tournament || fault.reason === "JOIN_CODE_WRONG")) {
+    return <Notice kind="fault">{wordsOf(fault)}</Notice>;
+  }
+  if (!tournament) return <p class="soft">{t().common.loading}</p>;
+  if (tournament.tournamentId !== tournamentId) return <Notice kind="fault">{reasons.TOURNAMENT_UNKNOWN}</Notice>;
+  // The page opens again, with the secret of the place.
+  const arrive = () =>
+    navigate({ page: "tournament", tournamentId }, { replace: true, search: languageOf(location.search) });
+  return (
+    <div class={tournamentsCss.tournament}>
+      <Head tournament={tournament} />
+      {tournament.state === TournamentState.OPEN ? (
+        <JoinTournament tournament={tournament} onJoined={arrive} />
+      ) : (
+        !isEnded(tournament) && <Notice kind="hint">{reasons.TOURNAMENT_STARTED}</Notice>
+      )}
+    </div>
+  );
+}
+
 /** The page for a visitor or a participant. */
 function Visited({ live }: { live: LiveTournament }) {
   const { tournament } = live;
   const { tournamentId } = tournament;
   const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournamentId));
   const open = tournament.state === TournamentState.OPEN;
-  const isInvited = new URLSearchParams(location.search).get("code");
   const arrive = () => {
     // The link has been used: a reload shows the place that was taken.
     readdress(languageOf(location.search));
@@ -107,10 +157,35 @@ function Visited({ live }: { live: LiveTournament }) {
     <Overview live={live} mine={undefined}>
       <Organiser live={live} />
       {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
-      {!open && isInvited && !isEnded(tournament) && (
+      {!open && invitedWith() && !isEnded(tournament) && (
         <Notice kind="hint">{t().faults.byReason.TOURNAMENT_STARTED}</Notice>
       )}
     </Overview>
+  );
+}
+
+/** Name, state and how it is played, with links to other views. */
+function Head({ tournament, children }: { tournament: Tournament; children?: ComponentChildren }) {
+  const deals = dealsWords(tournament);
+  return (
+    <header class={tournamentsCss.head}>
+      <div>
+        <h1>{tournament.settings?.name}</h1>
+        <p>
+          <TournamentStateChip tournament={tournament} /> <span class="soft">{inShort(tournament)}</span>
+        </p>
+        {tournament.round === 0 && !isEnded(tournament) && (
+          <ul class={tournamentsCss.play}>
+            {playWords(tournament).map((words) => (
+              <li key={words}>{words}</li>
+            ))}
+          </ul>
+        )}
+        {deals && <p class="soft small">{deals}</p>}
+        <Countdown tournament={tournament} />
+      </div>
+      <div class={tournamentsCss.links}>{children}</div>
+    </header>
   );
 }
 
@@ -128,34 +203,16 @@ function Overview({ live, mine, children }: OverviewProps) {
   const games = useGames(live);
   const confidence = useConfidence(live);
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
-  const deals = dealsWords(tournament);
   return (
     <>
-      <header class={tournamentsCss.head}>
-        <div>
-          <h1>{tournament.settings?.name}</h1>
-          <p>
-            <TournamentStateChip tournament={tournament} /> <span class="soft">{inShort(tournament)}</span>
-          </p>
-          {tournament.round === 0 && !isEnded(tournament) && (
-            <ul class={tournamentsCss.play}>
-              {playWords(tournament).map((words) => (
-                <li key={words}>{words}</li>
-              ))}
-            </ul>
-          )}
-          {deals && <p class="soft small">{deals}</p>}
-          <Countdown tournament={tournament} />
-        </div>
-        <div class={tournamentsCss.links}>
-          {tournament.round > 0 && (
-            <ButtonLink href={pathOf({ page: "results", tournamentId: tournament.tournamentId })}>
-              {words.results.open}
-            </ButtonLink>
-          )}
-          <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
-        </div>
-      </header>
+      <Head tournament={tournament}>
+        {tournament.round > 0 && (
+          <ButtonLink href={pathOf({ page: "results", tournamentId: tournament.tournamentId })}>
+            {words.results.open}
+          </ButtonLink>
+        )}
+        <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
+      </Head>
       {children}
       <section class={`sheet ${tournamentsCss.part}`}>
         <h2>{tournament.round === 0 ? words.standings.field : standingsTitle(tournament)}</h2>

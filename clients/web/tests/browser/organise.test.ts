@@ -57,6 +57,39 @@ test("a tournament is created, joined from another browser, filled up, started a
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
+test("who is invited to a private tournament joins by the link and by the code, and nobody else sees it", async () => {
+  const host = await person(browser);
+  await host.page.goto(`${server.url}/tournaments/new`);
+  await host.page.getByLabel("Name of the tournament").fill("Club evening");
+  await host.page.getByRole("radio", { name: "Round robin" }).check();
+  await host.page.getByText("Deals, rules, errors and spectators").click();
+  await host.page.getByLabel("Visible to").selectOption("private");
+  await host.page.getByRole("button", { name: "Create the tournament" }).click();
+  const invitation = await host.page.getByText(/\/tournaments\/[0-9a-f]{32}\?code=[0-9A-Z]{8}$/).textContent();
+  const [address = "", code = ""] = (invitation ?? "").split("?code=");
+
+  const stranger = await person(browser);
+  await stranger.page.goto(address);
+  await stranger.page.getByText("This tournament does not exist, or it is private.").waitFor();
+
+  const byLink = await person(browser);
+  await byLink.page.goto(`${address}?code=${code}`);
+  const byCode = await person(browser);
+  await byCode.page.goto(server.url);
+  await byCode.page.getByLabel("Join code").fill(code);
+  await byCode.page.getByRole("button", { name: "Continue" }).click();
+  for (const [{ page }, name] of [
+    [byLink, "Rosa"],
+    [byCode, "Ada"],
+  ] as const) {
+    await page.getByRole("heading", { name: "Club evening", level: 1 }).waitFor();
+    await page.getByLabel("Your name").fill(name);
+    await page.getByRole("button", { name: "Join the tournament" }).click();
+    await page.getByText(`You are taking part as ${name}.`).waitFor();
+  }
+  expect([...host.faults, ...byLink.faults, ...byCode.faults]).toEqual([]);
+});
+
 test("the organiser adds a person at a physical table, and attends to the game there", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);
