@@ -4,7 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
 import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test } from "vitest";
+import { afterEach, expect, test, vi } from "vitest";
 import { StudyShownQuestionnaireSchema } from "../src/gen/chefshat/v1/study_pb";
 import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatted";
 import { WithPictures } from "../src/studies/Pictures";
@@ -18,6 +18,7 @@ const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" 
 const GAMES = { case: "choice" as const, value: { options: ["cards", "chess"], multiple: true } };
 
 afterEach(() => act(() => render(null, root)));
+afterEach(() => void vi.useRealTimers());
 
 const show = (what: ComponentChild) => act(() => render(what, root));
 const shownItems = () => [...root.querySelectorAll<HTMLElement>("[data-item]")].map(({ dataset }) => dataset.item);
@@ -192,4 +193,30 @@ test("a question has markup, and its field a name without", async () => {
   // Blocks other than paragraphs stand as they are written.
   expect(root.textContent).toContain("1. How *sure*");
   expect(plainText(text)).toBe("1. How *sure* are you, really?");
+});
+
+test("what is still to be saved when the questionnaire is over is not saved in the next one", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+  const saves: [step: number, values: unknown][] = [];
+  let fail = (_: Error) => {};
+  const part = {
+    progress: () => ({ step: 3, reachedAtMs: 0, saved: [] }),
+    save: (answers: ItemAnswer[], step: number) => {
+      saves.push([step, answers.map(({ value }) => value?.value)]);
+      return new Promise<void>((_, reject) => {
+        fail = reject;
+      });
+    },
+    answer: async () => {},
+  };
+  const questionnaire = create(StudyShownQuestionnaireSchema, { items: [{ item: 0, text: "How old?", kind: AGE }] });
+  await show(<Questionnaire questionnaire={questionnaire} part={part} />);
+  for (const age of ["20", "21"]) {
+    await type(0, age);
+    await vi.advanceTimersByTimeAsync(500);
+  }
+  await act(() => render(null, root));
+  fail(new Error("too late"));
+  await vi.advanceTimersByTimeAsync(0);
+  expect(saves).toEqual([[3, [20]]]);
 });

@@ -35,11 +35,12 @@ const SAVE_AFTER_MS = 500;
 export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
   const { title, instructions, items } = questionnaire;
   const words = t().studies.questionnaire;
-  const [{ reachedAtMs, saved }] = useState(part.progress);
+  const [{ step, reachedAtMs, saved }] = useState(part.progress);
   const [draft, setDraft] = useState<Draft>(() => draftOf(saved));
   const [tried, setTried] = useState(false);
   const { busy, fault, run } = useAttempt();
-  const save = useSaving(part.save);
+  // Saved late, answers still belong to the step at which they were entered.
+  const save = useSaving((answers) => part.save(answers, step));
   const form = useRef<HTMLFormElement>(null);
   const tables = useMemo(() => tablesOf(items), [items]);
   const shown = shownItems(items, draft);
@@ -115,6 +116,7 @@ function useSaving(send: (answers: ItemAnswer[]) => Promise<void>): (answers: It
     document.addEventListener("visibilitychange", hide);
     return () => {
       clearTimeout(timer.current);
+      unsaved.current = undefined;
       document.removeEventListener("visibilitychange", hide);
     };
   }, []);

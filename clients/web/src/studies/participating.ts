@@ -54,7 +54,7 @@ export interface Participating {
   consent(): Promise<void>;
   answer(answers: ItemAnswer[]): Promise<void>;
   /** Lets the server keep what was entered so far. */
-  save(answers: ItemAnswer[]): Promise<void>;
+  save(answers: ItemAnswer[], step: number): Promise<void>;
   /** Continues from a text, another site or a game. */
   proceed(): Promise<void>;
   sendTraces(gameId: string, traces: Trace[]): Promise<void>;
@@ -217,8 +217,7 @@ export function startParticipating(given: string): Participating {
     },
     consent: () => act((at) => participationApi.giveConsent(at, call)),
     answer: (answers) => act((at) => participationApi.answerQuestionnaire({ ...at, answers }, call)),
-    save: async (answers) => {
-      const step = view.peek()?.step ?? -1;
+    save: async (answers, step) => {
       await participationApi.saveAnswers({ session, step, answers }, call);
     },
     proceed: () => act((at) => participationApi.continueStudy(at, call)),
