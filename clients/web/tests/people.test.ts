@@ -9,6 +9,7 @@ import {
   ParticipantKind,
   RecordedPlayerSchema,
   RoomState,
+  Visibility,
 } from "../src/gen/chefshat/v1/room_pb";
 import { setLanguage } from "../src/i18n";
 import { ownGame, sum, unratedBecause } from "../src/people/games";
@@ -79,7 +80,12 @@ test("an unrated game says why", () => {
     changed({ origin: GameOrigin.FIXED_SEED }),
     changed({ seats: seatsWith(2, { kind: ParticipantKind.HUMAN }) }),
     changed({ seats: seatsWith(0, { replay: create(RecordedPlayerSchema, { gameId: "g" }) }) }),
+    changed({ visibility: Visibility.UNLISTED }),
+    changed({ visibility: Visibility.PRIVATE }),
+    changed({ seats: seatsWith(1, { shownKind: ParticipantKind.ROBOT }) }),
     changed({ state: RoomState.ABORTED }),
+    changed({ origin: GameOrigin.PHYSICAL }),
   ];
-  expect(why).toEqual(["substituted", "hinted", "added", "notDealt", "twice", "recorded", null]);
+  const expected = ["substituted", "hinted", "added", "notDealt", "twice", "recorded", "hidden", "hidden", "wizard"];
+  expect(why).toEqual([...expected, null, null]);
 });

@@ -15,6 +15,7 @@ export function WhichAreRated({ open = false }: { open?: boolean }) {
           <li key={condition}>{condition}</li>
         ))}
       </ul>
+      <p>{words.losing}</p>
       <p>{words.toSee}</p>
     </details>
   );

@@ -3,7 +3,7 @@
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
 import type { AskPage } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
-import { GameOrigin, type Participant, RoomState } from "../gen/chefshat/v1/room_pb";
+import { GameOrigin, type Participant, ParticipantKind, RoomState, Visibility } from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 
 /** Most lines of the leaderboard in a response. */
@@ -71,14 +71,20 @@ export function ownGame(record: RecordSummary, name: string, fingerprint = ""): 
 }
 
 /** Why a game with a result is not rated. */
-export type Unrated = "added" | "hinted" | "notDealt" | "recorded" | "substituted" | "twice";
+export type Unrated = "added" | "hidden" | "hinted" | "notDealt" | "recorded" | "substituted" | "twice" | "wizard";
 
-/** Why a game is not rated, as in docs/ratings.md; null if it is, or was aborted. */
+/** Origins of games that are rated. */
+const RATED_ORIGINS = [GameOrigin.DEALT, GameOrigin.PHYSICAL];
+
+/** Why a game is not rated, as in server/record/src/rated.rs and docs/ratings.md; null if it is, or was aborted. */
 export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.state !== RoomState.FINISHED) return null;
   if (record.added) return "added";
-  if (record.origin !== GameOrigin.DEALT) return "notDealt";
+  // In responses, public is unspecified.
+  if (record.visibility !== Visibility.UNSPECIFIED) return "hidden";
+  if (!RATED_ORIGINS.includes(record.origin)) return "notDealt";
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
+  if (record.seats.some(({ shownKind }) => shownKind !== ParticipantKind.UNSPECIFIED)) return "wizard";
   // Who was substituted or given a hint has lost the game; records of earlier versions do not say who.
   const lost = record.seats.filter(({ substituted }) => substituted).length;
   if (record.substituted && (lost === 0 || lost === record.seats.length)) return "substituted";
