@@ -1,14 +1,20 @@
 // The attendant's view: what it shows of each state, and the reports that its controls send.
 
+import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { beforeEach, describe, expect, test } from "vitest";
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { tableApi } from "../src/api/client";
+import { secretsFor } from "../src/api/secrets";
+import { AttendPage } from "../src/attend/AttendPage";
 import { AttendView, pictureSource } from "../src/attend/AttendView";
 import type { Outcome, ReportKind } from "../src/attend/attending";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { RoomPolicySchema, Visibility } from "../src/gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
-import { TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
+import { TableServiceWatchResponseSchema, TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
 import { setLanguage } from "../src/i18n";
+import { forgetAll } from "../src/store";
 import { root, settle } from "./mounted";
 import { DEALT, OBSERVATION, stateOf } from "./table-state";
 
@@ -19,6 +25,8 @@ beforeEach(() => {
   sent = [];
   outcome = { kind: "accepted" };
 });
+
+afterEach(() => void vi.restoreAllMocks());
 
 const show = (state: TableState) =>
   act(() =>
@@ -496,4 +504,22 @@ test("what was pressed while a report was refused is not sent, and the page says
   await answer({ kind: "violation" });
   expect(sent.map((one) => one.case)).toEqual(["pass"]);
   expect(root.textContent).toContain("Not sent");
+});
+
+test("a device that had only the ticket of a private table shows its replay after the end", async () => {
+  const roomId = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
+  const ticket = roomId + "ab".repeat(32);
+  history.replaceState(null, "", `/rooms/${roomId}/table#ticket=${ticket}`);
+  const state = stateOf({ stage: TableStage.OVER, seat: undefined });
+  if (state.room) state.room.policy = create(RoomPolicySchema, { visibility: Visibility.PRIVATE });
+  vi.spyOn(tableApi, "watch").mockImplementation(async function* () {
+    yield create(TableServiceWatchResponseSchema, { state });
+  });
+  await act(() => render(<AttendPage route={{ page: "attend", roomId }} />, root));
+  await settle();
+  expect(heading()).toBe("The game is over");
+  await act(() => render(null, root));
+  expect(secretsFor("GetRecord", { gameId: "g1" })).toEqual([ticket]);
+  forgetAll();
+  history.replaceState(null, "", "/");
 });

@@ -3,6 +3,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
+import { keepSecret } from "../api/secrets";
 import { TableStage } from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
 import { CopyLine, QrCode, ThisMachine } from "../lobby/Invite";
@@ -49,10 +50,14 @@ function Attended({ roomId, ticket, attending }: AttendedProps) {
   useEffect(() => {
     if (unknown) keepTableTicket(roomId, null);
   }, [unknown]);
+  const room = state?.room;
+  useEffect(() => {
+    // It shows the record when the page has been left.
+    if (room) keepSecret(ticket, room.policy, room.gameId);
+  }, [room?.gameId]);
   const trouble = failed ? (unknown ? t().attend.gone : wordsOf(failed)) : "";
   if (failed && !state) return <ErrorPage title={t().attend.title} words={trouble} />;
-  if (!state?.room) return <p class="soft">{t().common.loading}</p>;
-  const { room } = state;
+  if (!state || !room) return <p class="soft">{t().common.loading}</p>;
   const early = isBeforePlay(state) && (state.observation?.shift ?? 1) === 1;
   return (
     <>
