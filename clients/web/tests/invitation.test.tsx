@@ -83,6 +83,26 @@ test("while the server is away, the room that was found stays, and one that was 
   expect(root.querySelector('[data-part~="join-room"]')?.textContent).toContain("Table one");
 });
 
+test("a pasted link is followed, with what it brings, and no code is asked for", async () => {
+  const asked = vi.spyOn(roomApi, "getRoom");
+  const followed = vi.spyOn(location, "assign").mockReturnValue();
+  await act(() => render(<Join route={{ page: "join", code: "" }} />, root));
+  const enter = async (text: string) => {
+    const input = root.querySelector("input");
+    if (!input) throw new Error("there is no field");
+    input.value = text;
+    await act(() => void input.dispatchEvent(new Event("input", { bubbles: true })));
+    await act(() => root.querySelector("button")?.click());
+  };
+  await enter(`https://example.org/rooms/${ID}#seat=secret`);
+  expect(followed.mock.calls).toEqual([[`/rooms/${ID}#seat=secret`]]);
+  await enter("https://example.org/else/where#secret");
+  expect(root.textContent).toContain(t().lobby.join.codeMissing);
+  expect(followed).toHaveBeenCalledTimes(1);
+  expect(asked).not.toHaveBeenCalled();
+  expect(location.pathname).toBe("/");
+});
+
 async function openTournament(search: string) {
   history.replaceState(null, "", `/tournaments/${ID}${search}`);
   vi.spyOn(tournamentApi, "followTournament").mockImplementation(() => {

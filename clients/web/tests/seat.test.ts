@@ -2,7 +2,7 @@
 // them.
 
 import { beforeEach, expect, test } from "vitest";
-import { codeIn } from "../src/lobby/JoinForm";
+import { addressIn, codeIn } from "../src/lobby/JoinForm";
 import {
   decideSeat,
   giveUpSeat,
@@ -86,13 +86,33 @@ test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is neither a seat no
 });
 
 test.each([
-  ["bcdf2345", "BCDF2345", ""],
-  [" bcdf 2345 ", "BCDF2345", ""],
-  ["http://127.0.0.1:50051/join/bcdf2345", "BCDF2345", ""],
-  ["http://127.0.0.1:50051/join/bcdf2345?as=robot&lang=it ", "BCDF2345", "?as=robot&lang=it"],
-  ["", "", ""],
-])("%j is the code %s, and besides %j", (typed, code, search) => {
-  expect(codeIn(typed)).toEqual({ code, search });
+  ["bcdf2345", "BCDF2345"],
+  [" bcdf 2345 ", "BCDF2345"],
+  ["", ""],
+  ["https://example.org/else/where", ""],
+  ["#seat=x", ""],
+])("%j is the code %j", (typed, code) => {
+  expect(addressIn(typed)).toBeNull();
+  expect(codeIn(typed)).toBe(code);
+});
+
+test.each([
+  ["http://127.0.0.1:50051/join/bcdf2345", "/join/bcdf2345"],
+  ["Come: 127.0.0.1/join/bcdf2345?as=robot&lang=it ", "/join/bcdf2345?as=robot&lang=it"],
+  ["http://127.0.0.1/tournaments/89ab?code=BCDF2345&name=P07", "/tournaments/89ab?code=BCDF2345&name=P07"],
+  [" /tournaments/89ab ", "/tournaments/89ab"],
+  ["https://example.org/join/X#token=T", "/join/X#token=T"],
+  ["https://example.org/#token=T", "/#token=T"],
+  ["https://example.org/study/abc", "/study/abc"],
+  ["https://example.org//rooms/./x", "/rooms/x"],
+])("the pasted text %j leads to %s", (typed, address) => {
+  expect(addressIn(typed)).toBe(address);
+});
+
+test("a pasted link that brings a seat is that link here, and no code", () => {
+  const link = linkToSeat(ROOM, HELD);
+  expect(location.origin + addressIn(link)).toBe(link);
+  expect(codeIn(link)).toBe("");
 });
 
 test("everything stored can be deleted, and nothing else is", () => {

@@ -11,7 +11,6 @@ import {
   TournamentSettingsSchema,
 } from "../src/gen/chefshat/v1/tournament_pb";
 import { refusedField } from "../src/lobby/form-state";
-import { tournamentIn } from "../src/lobby/JoinForm";
 import { fieldFor } from "../src/tournaments/Organiser";
 import {
   newTournament,
@@ -145,13 +144,4 @@ test.each([
   const participants = Array.from({ length: joined }, (_, participant) => ({ participant }));
   const tournament = create(TournamentSchema, { participants, settings: { format, rules: { players: 4 } } });
   expect(fieldFor(tournament)).toBe(field);
-});
-
-test.each([
-  ["http://127.0.0.1:50051/tournaments/89ab?code=BCDF2345&name=P07", { id: "89ab", search: "?code=BCDF2345&name=P07" }],
-  [" /tournaments/89ab ", { id: "89ab", search: "" }],
-  ["http://127.0.0.1:50051/tournaments/new", null],
-  ["BCDF2345", null],
-])("in %j there is the tournament %j", (typed, expected) => {
-  expect(tournamentIn(typed)).toEqual(expected);
 });

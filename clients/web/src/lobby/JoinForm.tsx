@@ -1,10 +1,11 @@
-// The form for a join code or the pasted address of an invitation.
+// The form for a join code or the pasted address of an invitation, or of any other page: the installed
+// page has no address bar.
 
 import { useState } from "preact/hooks";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
-import { navigate } from "../router";
+import { navigate, pathOf, routeOf } from "../router";
 import css from "./Join.module.css";
 import { canonical } from "./seat";
 
@@ -15,11 +16,12 @@ export function JoinForm() {
   const [missing, setMissing] = useState(false);
   const go = (event: Event) => {
     event.preventDefault();
-    const tournament = tournamentIn(code);
-    if (tournament) return navigate({ page: "tournament", tournamentId: tournament.id }, { search: tournament.search });
+    const address = addressIn(code);
+    // As if the link were followed: what it brings behind "#" is taken before anything is shown.
+    if (address) return location.assign(address);
     const typed = codeIn(code);
-    setMissing(typed.code === "");
-    if (typed.code !== "") navigate({ page: "join", code: typed.code }, { search: typed.search });
+    setMissing(typed === "");
+    if (typed !== "") navigate({ page: "join", code: typed });
   };
   return (
     <form class={css.form} onSubmit={go}>
@@ -37,16 +39,16 @@ export function JoinForm() {
   );
 }
 
-/**
- * The code in the input, which is a code or an address that ends in one, and the address's query.
- */
-export function codeIn(typed: string): { code: string; search: string } {
-  const address = /\/join\/([^/?#\s]+)(\?[^#\s]*)?/.exec(typed);
-  return { code: canonical(address?.[1] ?? typed), search: address?.[2] ?? "" };
+/** The code in the input; empty if it may be a part of a link, which has "/" or "#" and may have a secret. */
+export function codeIn(typed: string): string {
+  return /[/#]/.test(typed) ? "" : canonical(typed);
 }
 
-/** The tournament of a pasted invitation, and its query; null for any other input. */
-export function tournamentIn(typed: string): { id: string; search: string } | null {
-  const address = /\/tournaments\/([0-9a-f]+)(\?\S*)?$/.exec(typed.trim());
-  return address?.[1] ? { id: address[1], search: address[2] ?? "" } : null;
+/** The path, query and fragment here of a pasted link to a page; null for any other input. */
+export function addressIn(typed: string): string | null {
+  const [, path] = /(?:https?:\/\/)?[^\s/]*(\/\S+)/.exec(typed) ?? [];
+  if (!path) return null;
+  const { pathname, search, hash } = new URL(location.origin + path);
+  const route = routeOf(pathname);
+  return route.page === "unknown" ? null : pathOf(route) + search + hash;
 }
