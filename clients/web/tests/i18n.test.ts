@@ -1,6 +1,6 @@
 // Every language has the same texts as English, and the language is chosen in the documented order.
 
-import { describe, expect, test } from "vitest";
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { firstKnown, languages, setLanguage, showLanguage, t } from "../src/i18n";
 import { en } from "../src/i18n/en";
 import { time } from "../src/i18n/en/time";
@@ -52,6 +52,58 @@ test("a language without texts is not shown", async () => {
   expect(t().common.close).toBe("Chiudi");
   await showLanguage("de");
   expect(t().common.close).toBe("Schließen");
+});
+
+describe("texts that come late or not at all", () => {
+  beforeEach(() => {
+    vi.resetModules();
+    vi.stubGlobal("fetch", async () => Promise.reject(new TypeError("no network")));
+  });
+  afterEach(() => {
+    vi.doUnmock("../src/i18n/de");
+    vi.unstubAllGlobals();
+    vi.useRealTimers();
+    localStorage.clear();
+  });
+
+  test("of two languages the one that was chosen last is shown", async () => {
+    const { de } = await import("../src/i18n/de");
+    let arrive = () => {};
+    const late = new Promise<void>((resolve) => {
+      arrive = resolve;
+    });
+    vi.doMock("../src/i18n/de", async () => {
+      await late;
+      return { de };
+    });
+    const i18n = await import("../src/i18n");
+    const first = i18n.setLanguage("de");
+    await i18n.setLanguage("en");
+    arrive();
+    await first;
+    expect(i18n.language.value).toBe("en");
+    expect(i18n.t().common.close).toBe(en.common.close);
+  });
+
+  test("that of a study is tried again; a choice fails, and is stored for the next visit", async () => {
+    vi.useFakeTimers({ toFake: ["setTimeout"] });
+    const load = vi.fn(() => {
+      throw new Error("gone");
+    });
+    vi.doMock("../src/i18n/de", load);
+    const i18n = await import("../src/i18n");
+    await i18n.setLanguage("en");
+    await expect(i18n.setLanguage("de")).rejects.toThrow();
+    expect(localStorage.getItem("chefshat.language")).toBe("de");
+    expect(i18n.language.value).toBe("en");
+    load.mockClear();
+    let over = false;
+    void i18n.showLanguage("de").then(() => {
+      over = true;
+    });
+    while (!over) await vi.advanceTimersByTimeAsync(1_000);
+    expect(load.mock.calls.length).toBeGreaterThan(1);
+  });
 });
 
 test.each([

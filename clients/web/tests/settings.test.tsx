@@ -81,3 +81,28 @@ test("the time until the server answers is measured while the settings are open"
   await vi.advanceTimersByTimeAsync(60_000);
   expect(ask).toHaveBeenCalledTimes(2);
 });
+
+test("a language that cannot be loaded is reported", async () => {
+  vi.stubGlobal("fetch", async () => Promise.reject(new TypeError("no network")));
+  vi.resetModules();
+  vi.doMock("../src/i18n/it", () => {
+    throw new Error("gone");
+  });
+  try {
+    const { startLanguage, t } = await import("../src/i18n");
+    const { Settings } = await import("../src/parts/Settings");
+    await startLanguage();
+    await act(() => render(<Settings onClose={() => {}} />, root));
+    const select = root.querySelector("select");
+    if (!select) throw new Error("there is no choice of a language");
+    select.value = "it";
+    await act(() => void select.dispatchEvent(new Event("change", { bubbles: true })));
+    await vi.waitFor(() =>
+      expect(root.querySelector('[role="alert"]')?.textContent).toContain(t().common.pageNotLoaded),
+    );
+  } finally {
+    vi.doUnmock("../src/i18n/it");
+    vi.unstubAllGlobals();
+    localStorage.clear();
+  }
+});

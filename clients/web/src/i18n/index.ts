@@ -4,6 +4,7 @@
 // compile. A new language needs its folder and a line in TABLE.
 
 import { signal } from "@preact/signals";
+import { reloadsForNewVersion } from "../api/update";
 import { recall, remember } from "../store";
 import type { Texts } from "./en";
 
@@ -75,15 +76,34 @@ export function languageOf(search: string): string {
   return language === null ? "" : `?lang=${encodeURIComponent(language)}`;
 }
 
-/** Shows the page in a language without storing it; nothing happens if it has no texts. */
+/** Pauses before the texts of a language are loaded once more, milliseconds. */
+const RETRY_AFTER_MS = [2_000, 8_000, 32_000];
+
+/**
+ * Shows the page in a language without storing it, as soon as its texts can be loaded; nothing happens
+ * if it has none.
+ */
 export async function showLanguage(asked: string): Promise<void> {
-  if (isKnown(asked) && asked !== language.peek()) await load(asked);
+  if (!isKnown(asked)) return;
+  for (const pause of [...RETRY_AFTER_MS, undefined]) {
+    try {
+      return await load(asked);
+    } catch {
+      if ((await reloadsForNewVersion()) || pause === undefined) return;
+      await new Promise((resume) => setTimeout(resume, pause));
+      if (wanted !== asked) return;
+    }
+  }
 }
 
-/** Changes the language and stores the choice on this device. */
+/** Changes the language and stores the choice on this device. Throws if its texts cannot be loaded. */
 export async function setLanguage(chosen: Language): Promise<void> {
   remember("language", chosen);
-  await load(chosen);
+  try {
+    await load(chosen);
+  } catch (thrown) {
+    if (!(await reloadsForNewVersion())) throw thrown;
+  }
 }
 
 /** The first of these languages that has texts, by its main subtag ("it-CH" is Italian). */
@@ -99,8 +119,15 @@ function isKnown(code: string): code is Language {
   return Object.hasOwn(TABLE, code);
 }
 
+/** The language that was chosen last. */
+let wanted: Language | undefined;
+
 async function load(chosen: Language): Promise<void> {
-  texts.value = await textsIn(chosen);
+  wanted = chosen;
+  const loaded = await textsIn(chosen);
+  // Another was chosen meanwhile, whose texts may have come earlier.
+  if (wanted !== chosen) return;
+  texts.value = loaded;
   language.value = chosen;
   document.documentElement.lang = chosen;
 }

@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { CALL_LIMIT_MS, serverApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
-import { language, languages, setLanguage, t } from "../i18n";
+import { type Language, language, languages, setLanguage, t } from "../i18n";
 import { isNameKey, nameKeyText, setNameKey } from "../name-key";
 import { isOn, type Preference, setPreference } from "../preferences";
 import { forgetAll } from "../store";
@@ -16,22 +16,24 @@ import { ConfirmButton } from "./ConfirmButton";
 import { Dialog } from "./Dialog";
 import { CheckField, SelectField, TextField } from "./Field";
 import css from "./Layout.module.css";
+import { Notice } from "./Notice";
 import { UpdateSetting } from "./Update";
 
 /** The dialog of settings. */
 export function Settings({ onClose }: { onClose: () => void }) {
   const words = t().common.settings;
   const themes: Theme[] = ["system", "light", "dark"];
+  const [failed, setFailed] = useState(false);
+  const pickLanguage = (picked: Language) => {
+    setFailed(false);
+    setLanguage(picked).catch(() => setFailed(true));
+  };
   return (
     <Dialog title={words.title} onClose={onClose}>
       <div class={css.settings}>
         <UpdateSetting />
-        <SelectField
-          label={words.language}
-          value={language.value}
-          options={languages}
-          onPick={(picked) => void setLanguage(picked)}
-        />
+        <SelectField label={words.language} value={language.value} options={languages} onPick={pickLanguage} />
+        {failed && <Notice kind="fault">{t().common.pageNotLoaded}</Notice>}
         <SelectField
           label={words.theme}
           value={theme.value}
