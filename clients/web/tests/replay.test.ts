@@ -22,6 +22,9 @@ test.each(RECORDS)("%s: every decision is open once, at a table where it is that
   expect(open.map((frame) => frame.open)).toEqual(
     lines.flatMap(({ line }) => (line.case === "decision" ? [line.value] : [])),
   );
+  const opening = (number: number) => film.at(film.opening(number) ?? -1).open;
+  expect(open.map((_, index) => opening(index + 1))).toEqual(open.map((frame) => frame.open));
+  expect([0, 1.5, taken + 1].map(film.opening)).toEqual([undefined, undefined, undefined]);
   for (const frame of open) {
     const { seat, kind, action, actionMask } = frame.open ?? { seat: -1, actionMask: new Uint8Array() };
     expect(legalActions(actionMask)).toContain(action);

@@ -160,6 +160,5 @@ function lookupAt(table: TableState, open: Pick<DecisionRequest, "actionMask"> &
 /** The moment of ?decision=N in the address, or of the first deal. */
 function firstFrame(film: Film): number {
   const asked = Number(new URLSearchParams(location.search).get("decision"));
-  const found = asked >= 1 ? film.after(asked - 1) : undefined;
-  return found ?? film.shifts[0]?.frame ?? 0;
+  return film.opening(asked) ?? film.shifts[0]?.frame ?? 0;
 }

@@ -43,6 +43,8 @@ export interface Film {
   at(moment: number): Frame;
   /** The first moment after a number of decisions; undefined if there are fewer. */
   after(decisions: number): number | undefined;
+  /** The moment in which a decision is open, by its number from 1; undefined if there are fewer. */
+  opening(decision: number): number | undefined;
 }
 
 /** The change from one moment to the next. */
@@ -105,6 +107,10 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
     },
     after: (taken) => {
       const found = moments.findIndex((moment) => moment.decisions >= taken);
+      return found < 0 ? undefined : found;
+    },
+    opening: (decision) => {
+      const found = moments.findIndex((moment) => moment.open && moment.decisions === decision - 1);
       return found < 0 ? undefined : found;
     },
   };

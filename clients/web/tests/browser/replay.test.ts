@@ -66,13 +66,12 @@ test("the analysis of a moment shows what its actions were worth, and follows to
   const position = page.getByLabel("Position in the game");
   const taken = async () => Number((await position.getAttribute("aria-valuetext"))?.split(" ")[0]);
   await expect.poll(taken).toBe(11);
-  // From the end of a pizza to the next decision.
+  // Beyond the end of a pizza.
   const stepTo = async (decisions: number) => {
     while ((await taken()) < decisions || (await analysis.count()) === 0) {
       await page.getByRole("button", { name: "One step forward" }).click();
     }
   };
-  await stepTo(11);
   await analysis.locator("summary").click();
   for (const number of [12, 13, 14]) {
     const { hands, decision } = before(number);
