@@ -53,7 +53,7 @@ test("a stream that ends is not reopened if the server had nothing more to send"
       return stream(["a", "b"]);
     },
     (message) => heard.push(message) > 0,
-    () => heard.length === 2,
+    { isComplete: () => heard.length === 2 },
   );
   await vi.advanceTimersByTimeAsync(60_000);
   expect([opened, heard, following.link.value]).toEqual([1, ["a", "b"], "ended"]);
@@ -123,15 +123,64 @@ test("streams ask for heartbeats, other calls do not", async () => {
   }
 });
 
+test.each([true, false])(
+  "a stream that rests while the page is hidden (%s) is closed then, and opened again",
+  async (rests) => {
+    const page = vi.spyOn(document, "visibilityState", "get");
+    const show = (state: DocumentVisibilityState) => {
+      page.mockReturnValue(state);
+      document.dispatchEvent(new Event("visibilitychange"));
+    };
+    let [opened, open] = [0, 0];
+    const following = follow(
+      async function* (abort) {
+        opened += 1;
+        open += 1;
+        abort.addEventListener("abort", () => {
+          open -= 1;
+        });
+        const ended = untilAborted(abort);
+        for (;;) {
+          yield "heartbeat";
+          await Promise.race([ended, new Promise((resolve) => setTimeout(resolve, 3_000))]);
+        }
+      },
+      () => true,
+      { restsWhileHidden: rests },
+    );
+    // A look at another tab changes nothing.
+    show("hidden");
+    await vi.advanceTimersByTimeAsync(5_000);
+    show("visible");
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect([opened, open]).toEqual([1, 1]);
+    show("hidden");
+    await vi.advanceTimersByTimeAsync(60_000);
+    window.dispatchEvent(new Event("online"));
+    await vi.advanceTimersByTimeAsync(60_000);
+    expect([open, following.link.value]).toEqual([rests ? 0 : 1, "open"]);
+    show("visible");
+    await vi.advanceTimersByTimeAsync(0);
+    expect([opened, open, following.link.value]).toEqual([2, 1, "open"]);
+    following.stop();
+    page.mockRestore();
+  },
+);
+
+/** What a call that is aborted throws. */
+function untilAborted(abort: AbortSignal): Promise<never> {
+  return new Promise((_, reject) => {
+    abort.addEventListener("abort", () => reject(new ConnectError("aborted", Code.Canceled)));
+  });
+}
+
 test("a silent stream is reopened", async () => {
   let opened = 0;
   const following = follow(
     async function* (abort) {
       opened += 1;
       yield "heartbeat";
-      await new Promise((_, reject) => {
-        abort.addEventListener("abort", () => reject(new ConnectError("aborted", Code.Canceled)));
-      });
+      await untilAborted(abort);
     },
     () => true,
   );

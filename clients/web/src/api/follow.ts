@@ -37,15 +37,29 @@ export const askHeartbeats: Interceptor = (next) => (request) => {
   return next(request);
 };
 
+/** How a stream is followed. */
+interface Options {
+  /** Whether the server had nothing more to send, when a stream ends while more should follow. */
+  readonly isComplete?: () => boolean;
+  /**
+   * Closes the stream while the page is hidden: without HTTP/2, all tabs of a browser have six
+   * connections to a server. For what nobody's seat depends on, and what is the same when it is
+   * opened again.
+   */
+  readonly restsWhileHidden?: boolean;
+}
+
+/** The page is hidden this long before a stream is closed, milliseconds. */
+const REST_AFTER_MS = 10_000;
+
 /**
  * Follows the stream that `open` opens. `onMessage` receives every message and returns whether more
- * will follow. A stream that ends while more should follow is reopened, unless `isComplete` says that
- * the server had nothing more to send.
+ * will follow. A stream that ends while more should follow is reopened, unless it is complete.
  */
 export function follow<Message>(
   open: (signal: AbortSignal) => AsyncIterable<Message>,
   onMessage: (message: Message) => boolean,
-  isComplete: () => boolean = () => false,
+  { isComplete = () => false, restsWhileHidden = false }: Options = {},
 ): Following {
   const link = signal<Link>("connecting");
   const fault = signal<Fault | undefined>(undefined);
@@ -53,9 +67,20 @@ export function follow<Message>(
   let current = new AbortController();
   let heardAtMs = Date.now();
   let wake = () => {};
+  let resting = false;
+  let restTimer: ReturnType<typeof setTimeout> | undefined;
 
+  const rest = () => {
+    resting = true;
+    current.abort();
+  };
   const revive = () => {
-    if (document.visibilityState === "hidden") return;
+    clearTimeout(restTimer);
+    if (document.visibilityState === "hidden") {
+      if (restsWhileHidden) restTimer = setTimeout(rest, REST_AFTER_MS);
+      return;
+    }
+    resting = false;
     if (Date.now() - heardAtMs > SILENCE_MS) current.abort();
     wake();
   };
@@ -74,6 +99,7 @@ export function follow<Message>(
     stopped = true;
     link.value = last;
     clearInterval(watchdog);
+    clearTimeout(restTimer);
     document.removeEventListener("visibilitychange", revive);
     window.removeEventListener("online", reopen);
     current.abort();
@@ -94,6 +120,12 @@ export function follow<Message>(
 
   const run = async () => {
     for (let failures = 0; !stopped; failures += 1) {
+      while (resting && !stopped) {
+        await new Promise<void>((resolve) => {
+          wake = resolve;
+        });
+      }
+      if (stopped) return;
       let retryMs = 0;
       current = new AbortController();
       heardAtMs = Date.now();
@@ -117,6 +149,7 @@ export function follow<Message>(
         retryMs = found.retryMs ?? 0;
       }
       if (stopped) return;
+      if (resting) continue;
       link.value = "lost";
       const waitMs = Math.max(retryMs, Math.min(LONGEST_WAIT_MS, SHORTEST_WAIT_MS * 2 ** failures));
       await new Promise<void>((resolve) => {

@@ -125,7 +125,7 @@ function useStudy(studyId: string): StudyFollowing | undefined {
         merge(study, participants);
         return true;
       },
-      isOver,
+      { isComplete: isOver, restsWhileHidden: true },
     );
     setFollowed({ live, following, merge });
     return () => following.stop();

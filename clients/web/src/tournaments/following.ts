@@ -36,6 +36,7 @@ export function useTournament(tournamentId: string): FollowedTournament | undefi
         live.value = { tournament, standings, games };
         return !isEnded(tournament);
       },
+      { restsWhileHidden: true },
     );
     setFollowed({ live, following });
     return () => following.stop();
