@@ -1,9 +1,11 @@
 // The key of this device's names: made once, or entered from another device.
 
+import { create } from "@bufbuild/protobuf";
 import { afterEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
-import { takeSeat } from "../src/lobby/seat";
+import { JoinRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { heldSeat, lastName, takeSeat } from "../src/lobby/seat";
 import { isNameKey, NO_KEY, nameKey, nameKeyText, setNameKey } from "../src/name-key";
 import { forgetAll, remember } from "../src/store";
 
@@ -36,4 +38,11 @@ test("a seat is taken with the device's key, in a study without one", async () =
   await expect(takeSeat("BCDF2345", "Ada")).rejects.toThrow("no server");
   await expect(takeSeat("BCDF2345", "P07", 1, ParticipantKind.HUMAN, NO_KEY)).rejects.toThrow("no server");
   expect(join.mock.calls.map(([request]) => request.nameKey)).toEqual([nameKey(), NO_KEY]);
+});
+
+test("the name of a robot is not proposed as the person's own", async () => {
+  vi.spyOn(roomApi, "joinRoom").mockResolvedValue(create(JoinRoomResponseSchema, { room: { roomId: "01" } }));
+  await takeSeat("BCDF2345", "Ada");
+  await takeSeat("BCDF2345", "Pepper", 1, ParticipantKind.ROBOT, NO_KEY);
+  expect([lastName(), heldSeat("01")?.name]).toEqual(["Ada", "Pepper"]);
 });

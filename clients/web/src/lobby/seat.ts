@@ -115,7 +115,8 @@ export async function takeSeat(
   remember(SEAT + room.roomId, JSON.stringify(held));
   keepSecret(held.ticket, room.policy, room.gameId);
   remember(CODE + canonical(code), room.roomId);
-  remember("name", name.trim());
+  // A robot's name is not the person's own.
+  if (kind === ParticipantKind.HUMAN) remember("name", held.name);
   return room;
 }
 
