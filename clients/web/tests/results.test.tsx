@@ -13,7 +13,7 @@ import {
   TournamentState,
 } from "../src/gen/chefshat/v1/tournament_pb";
 import { ListTournamentGamesResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
-import { setLanguage } from "../src/i18n";
+import { dateOf, setLanguage } from "../src/i18n";
 import { fileName } from "../src/parts/download";
 import { forgetAll } from "../src/store";
 import { certificatesOf } from "../src/tournaments/certificate";
@@ -99,6 +99,20 @@ test.each([
   // A participant who has left has no place.
   expect(certificates[2]?.achieved).toBe(part);
   await setLanguage("en");
+});
+
+test("they have the day on which it started, not that on which it was created", () => {
+  const { settings } = tournament();
+  const dayOf = (startMs: number) => {
+    const planned = tournament();
+    if (settings) planned.settings = { ...settings, startAtMs: BigInt(startMs) };
+    return certificatesOf(planned, standings)[0]?.lines[0];
+  };
+  expect(dayOf(0)).toContain(dateOf(BigInt(CREATED_MS)));
+  vi.spyOn(Date, "now").mockReturnValue(CREATED_MS + 20 * 86_400_000);
+  expect(dayOf(CREATED_MS + 19 * 86_400_000)).toContain(dateOf(BigInt(CREATED_MS + 19 * 86_400_000)));
+  // It was started by hand, long before.
+  expect(dayOf(CREATED_MS + 21 * 86_400_000)).toContain(dateOf(BigInt(CREATED_MS)));
 });
 
 test("there are none before the end, or if it was closed early", () => {

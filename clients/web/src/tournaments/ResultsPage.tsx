@@ -14,7 +14,7 @@ import { type LiveTournament, useGames, useTournament } from "./following";
 import css from "./Results.module.css";
 import { Standings } from "./Standings";
 import { isEnded, nameIn, playedRounds } from "./structure";
-import { dealsWords, formatWord, inShort, settingsWords } from "./words";
+import { dayWords, dealsWords, formatWord, inShort, settingsWords } from "./words";
 
 /** The page. */
 export function ResultsPage({ route }: PageProps<"results">) {
@@ -46,7 +46,7 @@ export function Results({ live }: { live: LiveTournament }) {
       <header>
         <h1>{tournament.settings?.name}</h1>
         <p>
-          {dateOf(tournament.createdAtMs)} · {inShort(tournament)}
+          {dayWords(tournament)} · {inShort(tournament)}
         </p>
         {!isEnded(tournament) && <p>{words.results.provisional(dateOf(BigInt(Date.now())))}</p>}
       </header>

@@ -1,9 +1,9 @@
 // What the certificates of a tournament say. Printed by ResultsPage.tsx.
 
 import { type Tournament, type TournamentStanding, TournamentState } from "../gen/chefshat/v1/tournament_pb";
-import { dateOf, decimal, t } from "../i18n";
+import { decimal, t } from "../i18n";
 import { meanScore, nameOf, participantOf } from "./structure";
-import { formatWord } from "./words";
+import { dayWords, formatWord } from "./words";
 
 /** The texts of one certificate. */
 export interface Certificate {
@@ -39,7 +39,7 @@ export function certificatesOf(tournament: Tournament, standings: readonly Tourn
       achieved: placed ? words.placed(standing.place, standings.length) : words.tookPart,
       tournament: tournament.settings?.name ?? "",
       lines: [
-        [formatWord(tournament), words.rounds(tournament.rounds), dateOf(tournament.createdAtMs)].join(" · "),
+        [formatWord(tournament), words.rounds(tournament.rounds), dayWords(tournament)].join(" · "),
         ...(standing.games > 0 ? [results.join(" · ")] : []),
       ],
       signature: words.signature,

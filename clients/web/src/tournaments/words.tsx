@@ -8,7 +8,7 @@ import {
   type TournamentSettings,
   TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
-import { dateLocale, t } from "../i18n";
+import { dateLocale, dateOf, t } from "../i18n";
 import { clockOfPeople, visibilityWords } from "../lobby/rooms";
 import { StateChip } from "../parts/StateChip";
 import { joinedIn } from "./structure";
@@ -46,6 +46,13 @@ export function inShort(tournament: Tournament): string {
 /** When it was created: tournaments may have the same name. */
 export function madeWords({ createdAtMs }: Tournament): string {
   return t().tournaments.made(moment(createdAtMs));
+}
+
+/** The day of a tournament that has begun: for which its start was planned, else on which it was created. */
+export function dayWords({ createdAtMs, settings }: Tournament): string {
+  const { startAtMs = 0n } = settings ?? {};
+  // It may have started earlier than planned.
+  return dateOf(startAtMs > createdAtMs && startAtMs <= BigInt(Date.now()) ? startAtMs : createdAtMs);
 }
 
 /** A point in time, milliseconds since the Unix epoch. */
