@@ -12,6 +12,7 @@ import { GameOrigin, ParticipantKind, RoomState } from "../src/gen/chefshat/v1/r
 import { type Rated, RatedSchema } from "../src/gen/chefshat/v1/tournament_pb";
 import { GetLeaderboardResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { MAX_LINES } from "../src/people/games";
+import { LeaderboardPage } from "../src/people/LeaderboardPage";
 import { PersonPage } from "../src/people/PersonPage";
 import { Result } from "../src/table/view/Result";
 import { root, settle } from "./mounted";
@@ -118,6 +119,31 @@ test("with a fingerprint, a name is one participant; without, everybody who chos
   ).toEqual(["Rating person #0123", "Rating person #fedc"]);
   expect(root.textContent).toContain("several people");
   expect(new URL(link("#fedc")?.href ?? "").pathname).toMatch(/\/fedcba9876543210$/);
+});
+
+test("the games of one of many with a name are searched in large pages, and not all of them", async () => {
+  const records = Array.from({ length: 6_000 }, (_, number) => record(number, RoomState.FINISHED, "fedcba9876543210"));
+  const list = await show(records, [], "0123456789abcdef");
+  expect(list.mock.calls.map(([{ pageSize }]) => pageSize)).toEqual(Array.from({ length: 50 }, () => 100));
+  expect(root.textContent).toContain("None of the newest games with this name has this key.");
+  expect(root.textContent).not.toContain("There is no record");
+});
+
+test("the leaderboard shows more on request, and says where it ends", async () => {
+  const all = Array.from({ length: 1_300 }, (_, number) => line(`Player ${number}`));
+  vi.spyOn(tournamentApi, "getLeaderboard").mockImplementation(async ({ limit }) =>
+    create(GetLeaderboardResponseSchema, { rated: all.slice(0, limit), games: 1n }),
+  );
+  await act(() => render(<LeaderboardPage />, root));
+  await settle();
+  expect(rows()).toHaveLength(200);
+  const more = () => root.querySelector("button");
+  for (let clicks = 0; more() && clicks < 9; clicks += 1) {
+    await act(() => more()?.click());
+    await settle();
+  }
+  expect(rows()).toHaveLength(MAX_LINES);
+  expect(root.textContent).toContain("Only the first 1000 are shown.");
 });
 
 test("a rating is shown without games that the reader may see", async () => {

@@ -27,7 +27,7 @@ export interface Shown<Item> {
 }
 
 /** The server's largest page of rooms, tournaments and records. */
-const LARGEST_PAGE = 100;
+export const LARGEST_PAGE = 100;
 /** Most pages requested at a time. A page may be shorter than requested. */
 const MAX_PAGES = 50;
 

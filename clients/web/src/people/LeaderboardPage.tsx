@@ -6,12 +6,14 @@ import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
-import type { GetLeaderboardResponse } from "../gen/chefshat/v1/tournament_service_pb";
+import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { SelectField } from "../parts/Field";
 import { KindBadge } from "../parts/KindBadge";
+import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
+import { MAX_LINES } from "./games";
 import css from "./People.module.css";
 import { Fingerprint, PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
@@ -19,7 +21,7 @@ import { WhichAreRated } from "./WhichAreRated";
 
 /** Polling interval, milliseconds. */
 const EVERY_MS = 15_000;
-/** Most lines shown. */
+/** Lines shown at first, and more at a time. */
 const LINES = 200;
 
 const KINDS = {
@@ -36,12 +38,15 @@ export function LeaderboardPage() {
   const words = t().people;
   const [kind, setKind] = useState<keyof typeof KINDS>("all");
   const [minGames, setMinGames] = useState<(typeof MIN_GAMES)[number]>("1");
+  const [lines, setLines] = useState(LINES);
   const ask = (signal: AbortSignal) =>
     tournamentApi.getLeaderboard(
-      { kind: KINDS[kind], minGames: Number(minGames), limit: LINES },
+      { kind: KINDS[kind], minGames: Number(minGames), limit: Math.min(lines + 1, MAX_LINES) },
       { signal, timeoutMs: CALL_LIMIT_MS },
     );
-  const { value, fault } = usePolled(ask, EVERY_MS, `${kind} ${minGames}`);
+  const { value, fault } = usePolled(ask, EVERY_MS, `${kind} ${minGames} ${lines}`);
+  const rated = value?.rated.slice(0, lines) ?? [];
+  const list = { items: rated, more: (value?.rated.length ?? 0) > lines };
   const kinds = Object.keys(KINDS) as (keyof typeof KINDS)[];
   return (
     <div class={css.people}>
@@ -66,7 +71,9 @@ export function LeaderboardPage() {
       {value?.rated.length === 0 && <Nobody anybody={Number(value.games) > 0} />}
       {value && value.rated.length > 0 && (
         <>
-          <Lines board={value} />
+          <Lines rated={rated} />
+          <MoreButton shown={{ list, fault, showMore: () => setLines(lines + LINES) }} what={words.title} />
+          {rated.length === MAX_LINES && <p class="soft">{words.truncated(MAX_LINES)}</p>}
           <WhichAreRated />
         </>
       )}
@@ -87,12 +94,12 @@ function Nobody({ anybody }: { anybody: boolean }) {
   );
 }
 
-function Lines({ board }: { board: GetLeaderboardResponse }) {
+function Lines({ rated }: { rated: readonly Rated[] }) {
   const words = t().people.columns;
-  const ranges = board.rated.flatMap(({ rating }) => (rating ? [ratingRange(rating)] : []));
+  const ranges = rated.flatMap(({ rating }) => (rating ? [ratingRange(rating)] : []));
   const lowest = Math.min(...ranges.map(({ from }) => from));
   const highest = Math.max(...ranges.map(({ to }) => to));
-  const places = Math.max(...board.rated.map((line) => line.places.length));
+  const places = Math.max(...rated.map((line) => line.places.length));
   const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
@@ -117,7 +124,7 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
           </tr>
         </thead>
         <tbody>
-          {board.rated.map((line) => {
+          {rated.map((line) => {
             const range = line.rating && ratingRange(line.rating);
             return (
               <tr key={`${line.kind} ${line.builtIn} ${line.name} ${line.nameFingerprint}`}>

@@ -44,7 +44,7 @@ export function PersonPage({ route }: PageProps<"person">) {
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       {!list && !fault && <p class="soft">{t().common.loading}</p>}
       <Facts rated={rated.value} games={games} />
-      {list && games.length === 0 && <p class="sheet">{words.none}</p>}
+      {list && games.length === 0 && <p class="sheet">{list.more ? words.noneOfNewest : words.none}</p>}
       {games.length > 0 && (
         <>
           <section class="sheet stack">

@@ -1,7 +1,7 @@
 // A participant's games from the server's records: found by name, newest first, with totals.
 
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
-import type { AskPage } from "../api/pages";
+import { type AskPage, LARGEST_PAGE } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import { GameOrigin, type Participant, ParticipantKind, RoomState, Visibility } from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
@@ -41,6 +41,8 @@ export interface Sum {
 export function gamesOf(name: string, fingerprint: string): AskPage<OwnGame> {
   return async (page, signal) => {
     const asked = { filter: { participant: name }, newestFirst: true, ...page };
+    // Most games may be of others with this name.
+    if (fingerprint !== "") asked.pageSize = LARGEST_PAGE;
     const { records, nextPageToken } = await recordApi.listRecords(asked, { signal, timeoutMs: CALL_LIMIT_MS });
     return { items: records.flatMap((record) => ownGame(record, name, fingerprint) ?? []), nextPageToken };
   };

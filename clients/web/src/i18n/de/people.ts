@@ -27,6 +27,7 @@ export const people: Texts["people"] = {
     range: (from, to) => `zwischen ${from} und ${to}`,
   },
   order: "Sortiert nach einer vorsichtigen Schätzung: Wertung minus zwei Standardabweichungen.",
+  truncated: (count) => `Nur die ersten ${count} werden gezeigt.`,
   which: {
     title: "Welche Partien werden gewertet?",
     text: "Eine Partie wird automatisch gewertet, wenn",
@@ -65,6 +66,7 @@ export const people: Texts["people"] = {
       "Ein Name kann mehrere Schlüssel haben: Das können Partien mehrerer Personen sein, die denselben Namen gewählt haben.",
     played: "Gespielte Partien",
     none: "Es gibt keine Aufzeichnung einer Partie mit diesem Namen, die du sehen darfst.",
+    noneOfNewest: "Keine der neuesten Partien mit diesem Namen hat diesen Schlüssel.",
     ofShown: (count) => plural(count, { one: "von # gezeigten Partie", other: "von # gezeigten Partien" }),
     ofThese: (count) => plural(count, { one: "in dieser Partie", other: "in diesen # Partien" }),
     columns: { date: "Wann", place: "Platz", points: "Punkte", game: "Partie" },

@@ -23,6 +23,7 @@ export const people = {
     range: (from: string, to: string) => `between ${from} and ${to}`,
   },
   order: "Sorted by a cautious estimate: rating minus two standard deviations.",
+  truncated: (count: number) => `Only the first ${count} are shown.`,
   which: {
     title: "Which games are rated?",
     text: "A game is rated automatically if",
@@ -60,6 +61,7 @@ export const people = {
     sameName: "A name can have several keys: these may be games of several people who chose the same name.",
     played: "Games played",
     none: "There is no record of a game with this name that you may see.",
+    noneOfNewest: "None of the newest games with this name has this key.",
     ofShown: (count: number) => plural(count, { one: "of # game shown", other: "of # games shown" }),
     ofThese: (count: number) => plural(count, { one: "in this game", other: "in these # games" }),
     columns: { date: "When", place: "Place", points: "Points", game: "Game" },

@@ -34,6 +34,7 @@ export const people: Texts["people"] = {
     range: (from, to) => `entre ${from} y ${to}`,
   },
   order: "Orden según una estimación prudente: valoración menos dos desviaciones estándar.",
+  truncated: (count) => `Solo se muestran los primeros ${count}.`,
   which: {
     title: "¿Qué partidas son puntuables?",
     text: "Una partida es puntuable automáticamente si",
@@ -72,6 +73,7 @@ export const people: Texts["people"] = {
       "Un nombre puede tener varias claves: pueden ser partidas de varias personas que eligieron el mismo nombre.",
     played: "Partidas jugadas",
     none: "No hay registro de ninguna partida con este nombre que puedas ver.",
+    noneOfNewest: "Ninguna de las partidas más recientes con este nombre tiene esta clave.",
     ofShown: (count) => plural(count, { one: "de # partida mostrada", other: "de # partidas mostradas" }),
     ofThese: (count) => plural(count, { one: "en esta partida", other: "en estas # partidas" }),
     columns: { date: "Cuándo", place: "Puesto", points: "Puntos", game: "Partida" },

@@ -31,6 +31,7 @@ export const people: Texts["people"] = {
     range: (from, to) => `tra ${from} e ${to}`,
   },
   order: "Ordine secondo una stima prudente: valutazione meno due deviazioni standard.",
+  truncated: (count) => `Si vedono solo i primi ${count}.`,
   which: {
     title: "Quali partite sono valutate?",
     text: "Una partita è valutata automaticamente se",
@@ -69,6 +70,7 @@ export const people: Texts["people"] = {
       "Un nome può avere più chiavi: queste partite possono essere di più persone che hanno scelto lo stesso nome.",
     played: "Partite giocate",
     none: "Non c’è nessuna partita registrata con questo nome che tu possa vedere.",
+    noneOfNewest: "Nessuna delle partite più recenti con questo nome ha questa chiave.",
     ofShown: (count) => plural(count, { one: "su # partita mostrata", other: "su # partite mostrate" }),
     ofThese: (count) => plural(count, { one: "in questa partita", other: "in queste # partite" }),
     columns: { date: "Quando", place: "Posizione", points: "Punti", game: "Partita" },
