@@ -33,7 +33,7 @@ import {
   ListStudyLinksResponseSchema,
   RemoveStudyParticipantResponseSchema,
 } from "../src/gen/chefshat/v1/study_service_pb";
-import { startLanguage } from "../src/i18n";
+import { startLanguage, t } from "../src/i18n";
 import { zipped } from "../src/parts/zip";
 import { navigate, route } from "../src/router";
 import { forgetAll } from "../src/store";
@@ -278,6 +278,21 @@ test("removing the last question moves the focus to the button that adds one", a
   }
 });
 
+test("a number with letters is not taken for an empty field", async () => {
+  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
+  await act(() => render(<NewStudyPage />, root));
+  await settle();
+  const label = [...root.querySelectorAll("label")].find(
+    ({ textContent }) => textContent === t().studies.make.minWidth,
+  );
+  const width = root.querySelector<HTMLInputElement>(`[id="${label?.htmlFor}"]`);
+  if (!width) throw new Error("there is no field for the width");
+  width.value = "1024px";
+  await act(() => void width.dispatchEvent(new Event("input", { bubbles: true })));
+  await press(t().studies.make.submit);
+  expect(width.getAttribute("aria-invalid")).toBe("true");
+});
+
 test("values of enums are written in short, as for the command", async () => {
   const text = `
     groups = { size = 2, left_over = "agents" }
@@ -311,7 +326,7 @@ test("those of a study with groups may be added together, in whole groups", asyn
   expect(root.querySelector('[data-part="conditions"]')?.textContent).toContain("left over");
   expect(root.querySelector('[data-part="participants"]')?.textContent).toContain("group 7");
   const form = root.querySelector('[data-part="add-participants"]');
-  const count = form?.querySelector<HTMLInputElement>('input[type="number"]');
+  const count = form?.querySelector<HTMLInputElement>('input[inputmode="numeric"]');
   const together = form?.querySelector<HTMLInputElement>('input[type="checkbox"]');
   const enter = (number: string) =>
     act(() => {

@@ -58,10 +58,10 @@ function Remarks({ id, hint, fault }: { id: string } & Pick<FieldFrame, "hint" |
 interface TextProps extends FieldFrame {
   value: string;
   onText: (text: string) => void;
-  type?: "text" | "number" | "datetime-local";
+  type?: "text" | "datetime-local";
+  /** For numbers. A field of the type "number" would say that it is empty where it shows "12px". */
+  inputMode?: "numeric";
   name?: string;
-  min?: number;
-  max?: number;
   maxLength?: number;
   autoComplete?: string;
   autoCapitalize?: "characters" | "none" | "words";
@@ -69,7 +69,7 @@ interface TextProps extends FieldFrame {
   required?: boolean;
 }
 
-/** A line of text, or a number or local time as text. */
+/** A line of text, or a local time as text. */
 export function TextField({ label, hint, fault, faultId, onText, type = "text", ...rest }: TextProps) {
   return (
     <Field label={label} hint={hint} fault={fault} faultId={faultId}>

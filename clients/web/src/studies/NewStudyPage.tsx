@@ -156,8 +156,7 @@ function FromForm() {
     <TextField
       label={label}
       hint={hint}
-      type="number"
-      min={1}
+      inputMode="numeric"
       value={form[name]}
       onText={(typed) => change({ [name]: typed })}
       fault={faults[name]}

@@ -351,7 +351,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
     <form class={`sheet ${css.part}`} onSubmit={add} noValidate data-part="add-participants">
       <h2>{words.title}</h2>
       <div class={css.fields}>
-        <TextField label={words.count} value={count} onText={setCount} type="number" min={1} max={MAX_ADDED} />
+        <TextField label={words.count} value={count} onText={setCount} inputMode="numeric" />
         <Field label={words.names} hint={words.namesHint} fault={tried && !valid ? words.problem : undefined}>
           {(joined) => (
             <textarea {...joined} rows={2} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
@@ -400,9 +400,7 @@ function Tests({ study }: { study: Study }) {
             label={words.count}
             value={count}
             onText={setCount}
-            type="number"
-            min={1}
-            max={MAX_ADDED}
+            inputMode="numeric"
             fault={valid ? undefined : t().studies.make.problems.number(1, MAX_ADDED)}
           />
           {fault && <Notice kind="fault">{fault}</Notice>}
