@@ -324,6 +324,17 @@ test.each(["LINK_UNKNOWN", "STUDY_CLOSED", "STUDY_FULL"])("%s is said in words",
   const said = root.querySelector('[role="alert"]')?.textContent ?? "";
   expect(said).not.toContain(reason);
   expect(said.length).toBeGreaterThan(20);
+  expect(button("Try again")).toBeUndefined();
+});
+
+test("a study that failed can be opened again", async () => {
+  const { streams } = fakeStudy([TEXT]);
+  await show();
+  streams[0]?.fail(refused("INTERNAL", Code.Internal));
+  await settled();
+  expect(root.querySelector('[role="alert"]')?.textContent).toContain("Try again");
+  await press("Try again");
+  expect(title()).toBe("Welcome");
 });
 
 test("on another device than the study needs, the page says which, and opens the study where the window fits", async () => {

@@ -1,6 +1,7 @@
 // A study, for a participant: one stage after the other, as the server says. Withdrawing is possible
 // on every screen. The page knows nothing about conditions.
 
+import { Code } from "@connectrpc/connect";
 import type { ComponentChildren } from "preact";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
@@ -86,6 +87,13 @@ export function Taking({ part }: { part: Participating }) {
       <section class={`sheet ${css.stage}`}>
         <h1>{words.title}</h1>
         <Notice kind="fault">{wordsOf(part.fault.value)}</Notice>
+        {part.fault.value.code === Code.Internal && (
+          <div>
+            <Button look="main" onClick={part.open}>
+              {words.device.retry}
+            </Button>
+          </div>
+        )}
         <GoOn url={part.fault.value.metadata.url ?? ""} />
       </section>
     );
