@@ -33,7 +33,7 @@ import {
   ListStudyLinksResponseSchema,
   RemoveStudyParticipantResponseSchema,
 } from "../src/gen/chefshat/v1/study_service_pb";
-import { startLanguage, t } from "../src/i18n";
+import { setLanguage, startLanguage, t } from "../src/i18n";
 import { zipped } from "../src/parts/zip";
 import { navigate, route } from "../src/router";
 import { forgetAll } from "../src/store";
@@ -432,6 +432,16 @@ test.each([
   ["study.toml", "name ="],
 ])("a file that cannot be used says why: %s %s", async (name, text) => {
   await expect(settingsFrom(text, name)).rejects.toThrow(/./);
+});
+
+test("what is wrong with a file is said in the language of the page", async () => {
+  await setLanguage("de");
+  const problem = (text: string) => settingsFrom(text, "study.toml").catch((thrown: Error) => thrown.message);
+  expect(await problem('name = "x"')).toBe("sie hat keine Bedingungen.");
+  expect(await problem('[[pictures]]\nfile = "a.png"')).toBe("wähle a.png zusammen mit dieser Datei aus.");
+  expect(await problem("closes_at_ms = 2031-05-01")).toContain("mit ihrer Zone");
+  expect(await problem("name = 2031-05-01T18:00:00Z")).toBe("name ist keine Zeit.");
+  await setLanguage("en");
 });
 
 test("creating a study stores its owner token", async () => {

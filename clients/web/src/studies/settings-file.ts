@@ -7,6 +7,9 @@ import { fromJson, type JsonValue, toJson } from "@bufbuild/protobuf";
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { fromHex } from "../hex";
+import { t } from "../i18n";
+
+const problems = () => t().studies.make.fileProblems;
 
 /** The contents of files, by name. */
 type Files = ReadonlyMap<string, Uint8Array>;
@@ -25,7 +28,7 @@ export async function settingsFrom(text: string, name: string, files: Files = ne
     ? (await import("smol-toml")).parse(text)
     : JSON.parse(text);
   const settings = fromJson(StudySettingsSchema, inProtocolForm(withFiles(value as JsonValue, files)));
-  if (settings.conditions.length === 0) throw new Error("it has no conditions");
+  if (settings.conditions.length === 0) throw new Error(problems().noConditions);
   return settings;
 }
 
@@ -59,7 +62,7 @@ function withFiles(value: JsonValue, files: Files): JsonValue {
     // The browser gives the file, but not its folder.
     const name = String(named).split("/").at(-1) ?? "";
     const found = files.get(name);
-    if (!found) throw new Error(`choose ${name} together with this file`);
+    if (!found) throw new Error(problems().notChosen(name));
     return found;
   };
   const fields = Object.entries(value).map(([name, item]): [string, JsonValue] => {
@@ -74,9 +77,8 @@ function withFiles(value: JsonValue, files: Files): JsonValue {
 
 /** A date of TOML in milliseconds since the Unix epoch. */
 function timeOf(time: Date, field: string): string {
-  if (!field.endsWith("_at_ms")) throw new Error(`${field}: it is no time`);
-  if (!/(Z|[+-]\d\d:\d\d)$/.test(time.toISOString()))
-    throw new Error(`${field}: give the time with its zone, such as 2031-05-01T18:00:00+02:00`);
+  if (!field.endsWith("_at_ms")) throw new Error(problems().noTime(field));
+  if (!/(Z|[+-]\d\d:\d\d)$/.test(time.toISOString())) throw new Error(problems().noZone(field));
   return String(time.getTime());
 }
 

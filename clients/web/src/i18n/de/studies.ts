@@ -329,6 +329,12 @@ export const studies: Texts["studies"] = {
     agree: "Stimme völlig zu",
     beforeTitle: "Über Sie",
     afterTitle: "Ihre Eindrücke",
+    fileProblems: {
+      notChosen: (name) => `wähle ${name} zusammen mit dieser Datei aus.`,
+      noConditions: "sie hat keine Bedingungen.",
+      noTime: (field) => `${field} ist keine Zeit.`,
+      noZone: (field) => `${field}: gib die Zeit mit ihrer Zone an, etwa 2031-05-01T18:00:00+02:00.`,
+    },
     problems: {
       pictures: (most, each, all) =>
         `Höchstens ${most} Dateien (PNG, JPEG, GIF oder WebP), je ${each} KiB und zusammen ${all} KiB.`,

@@ -326,6 +326,12 @@ export const studies = {
     agree: "Strongly agree",
     beforeTitle: "About you",
     afterTitle: "Your impressions",
+    fileProblems: {
+      notChosen: (name: string) => `choose ${name} together with this file.`,
+      noConditions: "it has no conditions.",
+      noTime: (field: string) => `${field} is not a time.`,
+      noZone: (field: string) => `${field}: give the time with its zone, such as 2031-05-01T18:00:00+02:00.`,
+    },
     problems: {
       pictures: (most: number, each: number, all: number) =>
         `At most ${most} PNG, JPEG, GIF or WebP files, of ${each} KiB each and ${all} KiB together.`,

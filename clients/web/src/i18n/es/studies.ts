@@ -327,6 +327,12 @@ export const studies: Texts["studies"] = {
     agree: "Totalmente de acuerdo",
     beforeTitle: "Sobre usted",
     afterTitle: "Sus impresiones",
+    fileProblems: {
+      notChosen: (name) => `elige ${name} junto con este archivo.`,
+      noConditions: "no tiene condiciones.",
+      noTime: (field) => `${field} no es una hora.`,
+      noZone: (field) => `${field}: indica la hora con su zona, por ejemplo 2031-05-01T18:00:00+02:00.`,
+    },
     problems: {
       pictures: (most, each, all) =>
         `Como máximo ${most} archivos PNG, JPEG, GIF o WebP, de ${each} KiB cada uno y ${all} KiB en total.`,

@@ -327,6 +327,12 @@ export const studies: Texts["studies"] = {
     agree: "Del tutto d’accordo",
     beforeTitle: "Su di Lei",
     afterTitle: "Le Sue impressioni",
+    fileProblems: {
+      notChosen: (name) => `scegli ${name} insieme a questo file.`,
+      noConditions: "non ha condizioni.",
+      noTime: (field) => `${field} non è un orario.`,
+      noZone: (field) => `${field}: indica l’orario con il suo fuso, per esempio 2031-05-01T18:00:00+02:00.`,
+    },
     problems: {
       pictures: (most, each, all) =>
         `Al massimo ${most} file PNG, JPEG, GIF o WebP, di ${each} KiB ciascuno e ${all} KiB in tutto.`,
