@@ -1,6 +1,7 @@
 // The agents that people can choose from: wherever there is a list, none is for programs only.
 
 import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
@@ -58,4 +59,35 @@ test.each(PAGES)("%s", async (_, page) => {
   expect(options.filter((option) => option.includes("trained"))).not.toEqual([]);
   expect(root.innerHTML).toContain("greedy");
   expect(root.innerHTML).not.toContain("random_unmasked");
+});
+
+test("a form that was opened while the server was away gets its fields when it is back", async () => {
+  vi.resetModules();
+  const { serverApi } = await import("../src/api/client");
+  const { startLanguage } = await import("../src/i18n");
+  const { NewRoom } = await import("../src/lobby/NewRoom");
+  await startLanguage();
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+  const away = new ConnectError("away", Code.Unavailable);
+  vi.spyOn(serverApi, "getServerInfo")
+    .mockRejectedValueOnce(away)
+    .mockRejectedValueOnce(away)
+    .mockResolvedValue(
+      create(GetServerInfoResponseSchema, {
+        presets: [{ preset: "paper", players: 4, faces: 11 }],
+        builtInAgents: AGENTS,
+      }),
+    );
+  const pass = (ms: number) =>
+    act(async () => {
+      await vi.advanceTimersByTimeAsync(ms);
+    });
+  await act(() => render(<NewRoom />, root));
+  await pass(0);
+  expect(root.querySelector('[role="alert"]')).not.toBeNull();
+  expect(root.querySelector("form")).toBeNull();
+  await pass(60_000);
+  expect(root.querySelector('[role="alert"]')).toBeNull();
+  expect(root.querySelector("form")).not.toBeNull();
+  vi.useRealTimers();
 });

@@ -4,8 +4,9 @@
 import { useEffect, useState } from "preact/hooks";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import type { GetServerInfoResponse } from "../gen/chefshat/v1/server_service_pb";
+import { askUntilAnswered } from "./asking";
 import { CALL_LIMIT_MS, serverApi } from "./client";
-import { inWords } from "./faults";
+import { wordsOf } from "./faults";
 
 let asked: Promise<GetServerInfoResponse> | undefined;
 
@@ -40,20 +41,32 @@ export function isForPeople(agent: string): boolean {
   return agent !== FOR_PROGRAMS;
 }
 
-/** The server's offer for a form, and the error in words; both null while loading. */
+/**
+ * The server's offer for a form, and the error in words; both null while loading. Asked for again
+ * while the server is away.
+ */
 export function useOffered(): { offered: Offered | null; fault: string | null } {
   const [offered, setOffered] = useState<Offered | null>(null);
   const [fault, setFault] = useState<string | null>(null);
   useEffect(() => {
-    serverInfo().then(
-      ({ presets, builtInAgents, quickBuiltInAgents }) =>
-        setOffered({
-          presets,
-          agents: builtInAgents.filter(isForPeople),
-          quickAgents: quickBuiltInAgents.filter(isForPeople),
-        }),
-      (error: unknown) => setFault(inWords(error)),
+    let wanted = true;
+    const asking = askUntilAnswered(
+      serverInfo,
+      () => wanted,
+      (found) => wanted && setFault(wordsOf(found)),
     );
+    void asking.then((info) => {
+      if (!wanted || !info) return;
+      setFault(null);
+      setOffered({
+        presets: info.presets,
+        agents: info.builtInAgents.filter(isForPeople),
+        quickAgents: info.quickBuiltInAgents.filter(isForPeople),
+      });
+    });
+    return () => {
+      wanted = false;
+    };
   }, []);
   return { offered, fault };
 }
