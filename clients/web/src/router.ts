@@ -158,6 +158,17 @@ export function navigate(to: Route, options: { replace?: boolean; search?: strin
 }
 
 /**
+ * `navigate` for the end of a call, which may take long: it does nothing once another page has been
+ * opened.
+ */
+export function navigateFromHere(): typeof navigate {
+  const here = route.peek();
+  return (to, options) => {
+    if (route.peek() === here) navigate(to, options);
+  };
+}
+
+/**
  * Follows the browser's Back and Forward buttons and the links of this page. Returns a function
  * that stops it.
  */

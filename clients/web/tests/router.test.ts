@@ -1,7 +1,7 @@
 // Parsing and formatting addresses.
 
 import { expect, test } from "vitest";
-import { navigate, pathOf, type Route, readdress, route, routeOf, startRouter } from "../src/router";
+import { navigate, navigateFromHere, pathOf, type Route, readdress, route, routeOf, startRouter } from "../src/router";
 
 const ROUTES: [string, Route][] = [
   ["/", { page: "lobby" }],
@@ -43,6 +43,20 @@ test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s is unknown", (path) => {
 
 test("a badly encoded part is kept as it is", () => {
   expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A", fingerprint: "" });
+});
+
+test("a call that ends late leads nowhere once another page has been opened", () => {
+  navigate({ page: "tutorial" });
+  const [first, second] = [navigateFromHere(), navigateFromHere()];
+  first({ page: "rules" });
+  expect(location.pathname).toBe("/rules");
+  second({ page: "studies" }, { replace: true });
+  expect([location.pathname, route.value]).toEqual(["/rules", { page: "rules" }]);
+  // Also if it is the same page again.
+  const third = navigateFromHere();
+  navigate({ page: "rules" });
+  third({ page: "tutorial" });
+  expect(location.pathname).toBe("/rules");
 });
 
 test("a link to a place in the page leaves the page as it is, one that carries a ticket does not", () => {

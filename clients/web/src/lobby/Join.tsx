@@ -11,7 +11,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate, type PageProps, pathOf, type Route } from "../router";
+import { navigate, navigateFromHere, type PageProps, pathOf, type Route } from "../router";
 import { heldPlace, takePlace } from "../tournaments/place";
 import { paceOf, storePace } from "../wizard/pace";
 import { lookUp } from "./code";
@@ -132,6 +132,7 @@ export function NameForm({ code, room }: NameFormProps) {
     if (name.trim() === "" || taken) return;
     const pace = paceOf(new URLSearchParams(location.search).get("think") ?? "");
     if (asRobot && pace) storePace(pace);
+    const navigate = navigateFromHere();
     run(async () => navigate(await comeIn(code, name, asRobot)));
   };
   return (

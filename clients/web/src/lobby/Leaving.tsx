@@ -8,7 +8,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Dialog } from "../parts/Dialog";
 import { Notice } from "../parts/Notice";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { Tool } from "../table/view/Tools";
 import css from "./Leaving.module.css";
 import { clockOfPeople } from "./rooms";
@@ -56,6 +56,7 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
     onClose();
   };
   const leave = async () => {
+    const navigate = navigateFromHere();
     if (!playing) await giveBackSeat(roomId);
     navigate({ page: "lobby" });
   };

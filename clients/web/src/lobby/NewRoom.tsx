@@ -4,7 +4,7 @@
 import { agentsFor, type Offered } from "../api/server";
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { FormFrame, FormPage, FormPart } from "./FormPage";
 import { type FieldFaults, useFormState } from "./form-state";
 import { ClockFields, FaultFields, RuleFields, VisibilityField, WatchFields, wordsOfProblems } from "./GameFields";
@@ -27,6 +27,7 @@ function RoomFormView({ offered }: { offered: Offered }) {
     }),
     fields: ROOM_FIELDS,
     send: async (form) => {
+      const navigate = navigateFromHere();
       const { room } = await createRoom(requestOf(form));
       navigate({ page: form.cards === "real" ? "attend" : "room", roomId: room.roomId });
     },

@@ -3,12 +3,13 @@
 
 import { serverInfo } from "../api/server";
 import { t } from "../i18n";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { quickGame } from "./room-form";
 import { createRoom, takeSeat } from "./seat";
 
 /** Creates the game and navigates to it. Without a name the person is a guest. */
 export async function playNow(name: string): Promise<void> {
+  const navigate = navigateFromHere();
   const words = t().lobby.quick;
   const { builtInAgents } = await serverInfo();
   const player = name.trim() || words.guest;

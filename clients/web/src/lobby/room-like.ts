@@ -7,7 +7,7 @@ import { SECRET_HEADER } from "../api/secrets";
 import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { NO_KEY, nameKey } from "../name-key";
-import { navigate } from "../router";
+import { navigateFromHere, type Route } from "../router";
 import { closeRoom, createRoom, type HeldSeat, hostedRoom, saidRoom, takeSeat } from "./seat";
 
 /** The request for a room with the rules, the policy and the agents of another. */
@@ -40,6 +40,7 @@ function seatLike(seat: Participant, wizard: boolean) {
  * and navigates to it. If somebody else was faster, it takes the seat in that room.
  */
 export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat): Promise<void> {
+  const navigate = navigateFromHere();
   const room = await roomOfTicket(roomId, ticket);
   const made = await createRoom(requestLike(room));
   try {
@@ -47,11 +48,12 @@ export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat
   } catch (thrown) {
     if (faultOf(thrown).reason === "NEXT_ROOM_SET") {
       await closeRoom(made.room.roomId);
-      return joinAgain(await roomOfTicket(roomId, ticket), { name, seat });
+      const next = await roomOfTicket(roomId, ticket);
+      return navigate(await sitAgain(next, next.nextJoinCode, { name, seat }));
     }
     // Without the offer the others need the invitation, which the new room shows.
   }
-  await sitAgain(room, made.joinCode, { name, seat });
+  navigate(await sitAgain(room, made.joinCode, { name, seat }));
 }
 
 /** A room as its participants see it, with the join code of the room in which they play again. */
@@ -64,14 +66,15 @@ export async function roomOfTicket(roomId: string, ticket: string, signal?: Abor
 
 /** Takes the same seat in the room in which the participants of a room play again, and navigates to it. */
 export async function joinAgain(room: Room, { name, seat }: Pick<HeldSeat, "name" | "seat">): Promise<void> {
-  await sitAgain(room, room.nextJoinCode, { name, seat });
+  const navigate = navigateFromHere();
+  navigate(await sitAgain(room, room.nextJoinCode, { name, seat }));
 }
 
-/** Takes a seat as in a room before, and navigates to its room. */
-async function sitAgain(before: Room, code: string, { name, seat }: Pick<HeldSeat, "name" | "seat">): Promise<void> {
+/** Takes a seat as in a room before; returns the route to its room. */
+async function sitAgain(before: Room, code: string, { name, seat }: Pick<HeldSeat, "name" | "seat">): Promise<Route> {
   const kind = before.seats[seat]?.kind || ParticipantKind.HUMAN;
   // A robot's name is not the person's own.
   const key = kind === ParticipantKind.HUMAN ? nameKey() : NO_KEY;
   const { roomId } = await takeSeat(code, name, seat, kind, key);
-  navigate({ page: "room", roomId });
+  return { page: "room", roomId };
 }

@@ -8,7 +8,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { ConditionFields, QuestionFields } from "./FormFields";
 import css from "./Own.module.css";
 import { createStudy } from "./owning";
@@ -78,8 +78,10 @@ function FromFile() {
       setProblem(words.unreadable(thrown instanceof Error ? thrown.message : String(thrown)));
     }
   };
-  const make = (settings: StudySettings) =>
+  const make = (settings: StudySettings) => {
+    const navigate = navigateFromHere();
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settings, requestId) }));
+  };
   return (
     <section class={`sheet ${css.part}`} data-part="study-file">
       <h2>{words.fromFile}</h2>
@@ -136,6 +138,7 @@ function FromForm() {
     const unfinished = DATES.filter(isUnfinished);
     setUnfinished(unfinished);
     if (unfinished.length > 0 || Object.keys(faultsOf(form)).length > 0) return;
+    const navigate = navigateFromHere();
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
   };
   const text = (

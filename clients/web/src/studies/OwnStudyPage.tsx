@@ -25,7 +25,7 @@ import { download, fileName } from "../parts/download";
 import { CheckField, Field, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { zipped } from "../parts/zip";
-import { navigate, type PageProps } from "../router";
+import { navigateFromHere, type PageProps } from "../router";
 import { byCondition, stateName, statesOf } from "./board";
 import { studyApi } from "./client";
 import { LinkList } from "./LinkList";
@@ -236,6 +236,7 @@ function Delete({ study }: { study: Study }) {
   const words = t().studies.own.erase;
   const [refused, setRefused] = useState(false);
   const erase = async (force: boolean) => {
+    const navigate = navigateFromHere();
     try {
       await deleteStudy(study.studyId, force);
     } catch (thrown) {

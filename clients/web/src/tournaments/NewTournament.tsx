@@ -17,7 +17,7 @@ import {
 } from "../lobby/GameFields";
 import type { NumberProblem } from "../lobby/problems";
 import { CheckField, SelectField } from "../parts/Field";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { Choices } from "./Choices";
 import { createTournament } from "./hosting";
 import { FormatFields, type FormProps, StartFields, WhoFields } from "./TournamentFields";
@@ -48,6 +48,7 @@ function TournamentFormView({ offered }: { offered: Offered }) {
       Object.fromEntries(Object.entries(problemsOf(form)).map(([field, problem]) => [field, problemWords(problem)])),
     fields: TOURNAMENT_FIELDS,
     send: async (form) => {
+      const navigate = navigateFromHere();
       const tournamentId = await createTournament(settingsOf(form));
       navigate({ page: "tournament", tournamentId });
     },

@@ -6,7 +6,7 @@ import { t } from "../i18n";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { navigate } from "../router";
+import { navigateFromHere } from "../router";
 import { takeTable } from "./hosting";
 import { nameOf } from "./structure";
 import css from "./Tournaments.module.css";
@@ -36,7 +36,10 @@ function PhysicalGame({ tournament, game }: { tournament: Tournament; game: Tour
   const { busy, fault, run } = useAttempt();
   const { round, table, games } = t().tournaments;
   const names = game.seats.map(({ participant }) => nameOf(tournament, participant));
-  const open = async () => navigate({ page: "attend", roomId: await takeTable(tournament.tournamentId, game.game) });
+  const open = async () => {
+    const navigate = navigateFromHere();
+    navigate({ page: "attend", roomId: await takeTable(tournament.tournamentId, game.game) });
+  };
   return (
     <>
       <p>

@@ -12,7 +12,7 @@ import { canonical } from "../lobby/seat";
 import { WhichOne } from "../lobby/WhichOne";
 import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { isWall, navigate, type PageProps, pathOf, readdress } from "../router";
+import { isWall, navigateFromHere, type PageProps, pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
 import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
@@ -102,6 +102,7 @@ function Invited({ tournamentId, code }: { tournamentId: string; code: string })
     return (await tournamentApi.getTournament({ joinCode: canonical(code) }, call)).tournament;
   };
   const { value: tournament, fault } = usePolled(ask, INVITED_EVERY_MS, code);
+  const [navigate] = useState(navigateFromHere);
   const reasons = t().faults.byReason;
   if (fault && (!tournament || fault.reason === "JOIN_CODE_WRONG")) {
     return <Notice kind="fault">{wordsOf(fault)}</Notice>;
