@@ -5,7 +5,8 @@ import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { tournamentApi } from "../src/api/client";
+import { serverApi, tournamentApi } from "../src/api/client";
+import { GetClockResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import {
   TournamentGameSchema,
   TournamentGameState,
@@ -172,7 +173,26 @@ test("a place has no buttons after the end", async () => {
   expect(root.querySelector("button")).toBeNull();
 });
 
+test("the countdown runs by the server's clock", async () => {
+  vi.useFakeTimers({ now: 1_000_000 });
+  // Ten minutes behind, and with an answer that takes two seconds.
+  vi.spyOn(serverApi, "getClock").mockImplementation(async () => {
+    await new Promise((resolve) => setTimeout(resolve, 1_000));
+    const us = BigInt(Date.now() - 600_000) * 1_000n;
+    await new Promise((resolve) => setTimeout(resolve, 1_000));
+    return create(GetClockResponseSchema, { receivedAtUs: us, sentAtUs: us });
+  });
+  const settings = { startAtMs: 1_030_000n };
+  const tournament = create(TournamentSchema, { state: TournamentState.OPEN, settings });
+  await act(() => render(<Countdown tournament={tournament} />, root));
+  await act(async () => {
+    await vi.advanceTimersByTimeAsync(40_000);
+  });
+  expect(root.querySelector('[role="timer"]')?.textContent).toBe("Starts in 9:50");
+});
+
 test("the countdown runs to the start, and only before it", async () => {
+  vi.spyOn(serverApi, "getClock").mockRejectedValue(new Error("no server"));
   vi.useFakeTimers({ now: 1_000_000 });
   const show = (state: TournamentState, startAtMs: bigint) =>
     act(() => render(<Countdown tournament={create(TournamentSchema, { state, settings: { startAtMs } })} />, root));

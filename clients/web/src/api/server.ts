@@ -1,5 +1,5 @@
-// The server's description of itself: requested once, since it does not change while the page is
-// open.
+// The server's description of itself, requested once, since it does not change while the page is
+// open; and its clock.
 
 import { useEffect, useState } from "preact/hooks";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
@@ -18,6 +18,17 @@ export function serverInfo(): Promise<GetServerInfoResponse> {
     throw error;
   });
   return asked;
+}
+
+/** Milliseconds by which the server's time of day is ahead of the browser's; 0 if it does not say. */
+export async function aheadMs(): Promise<number> {
+  const askedMs = Date.now();
+  try {
+    const { receivedAtUs, sentAtUs } = await serverApi.getClock({}, { timeoutMs: CALL_LIMIT_MS });
+    return Number((receivedAtUs + sentAtUs) / 2_000n) - (askedMs + Date.now()) / 2;
+  } catch {
+    return 0;
+  }
 }
 
 /** What a game can be configured with. */

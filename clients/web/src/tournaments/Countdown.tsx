@@ -1,6 +1,7 @@
 // The time until a tournament starts by itself.
 
 import { useEffect, useState } from "preact/hooks";
+import { aheadMs } from "../api/server";
 import { type Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import css from "./Countdown.module.css";
@@ -9,10 +10,14 @@ import css from "./Countdown.module.css";
 export function Countdown({ tournament }: { tournament: Tournament }) {
   const atMs = Number(tournament.settings?.startAtMs ?? 0n);
   const waits = tournament.state === TournamentState.OPEN && atMs > 0;
-  const [nowMs, setNowMs] = useState(Date.now);
+  const [browserMs, setBrowserMs] = useState(Date.now);
+  const [ahead, setAhead] = useState(0);
+  const nowMs = browserMs + ahead;
   useEffect(() => {
     if (!waits) return;
-    const timer = setInterval(() => setNowMs(Date.now()), 1_000);
+    // The server starts it, whose clock may not be that of this device.
+    void aheadMs().then(setAhead);
+    const timer = setInterval(() => setBrowserMs(Date.now()), 1_000);
     return () => clearInterval(timer);
   }, [waits]);
   if (!waits) return null;
