@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { create } from "@bufbuild/protobuf";
-import { Code } from "@connectrpc/connect";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
@@ -339,7 +339,14 @@ test("those of a study with groups may be added together, in whole groups", asyn
   expect(form?.textContent).toContain("Add a multiple of 2.");
   expect(add).not.toHaveBeenCalled();
   await enter("4");
+  add.mockRejectedValueOnce(refused("STUDY_CLOSED"));
   await press("Add");
+  expect(form?.textContent).not.toContain("Perhaps they have been added");
+  add.mockRejectedValueOnce(new ConnectError("lost", Code.Unavailable));
+  await press("Add");
+  expect(form?.textContent).toContain("Perhaps they have been added");
+  await press("Add");
+  expect(form?.textContent).not.toContain("Perhaps they have been added");
   expect(add.mock.calls[0]?.[0]).toMatchObject({ count: 4, together: true });
 });
 

@@ -326,6 +326,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
   const [count, setCount] = useState("");
   const [names, setNames] = useState("");
   const [together, setTogether] = useState(false);
+  const [unsure, setUnsure] = useState(false);
   const size = settings?.groups?.size ?? 1;
   const [tried, setTried] = useState(false);
   const { busy, fault, run } = useAttempt();
@@ -340,8 +341,15 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
     event.preventDefault();
     setTried(true);
     if (!valid || isUneven) return;
+    setUnsure(false);
     run(async () => {
-      await addParticipants(studyId, number, pseudonyms, together);
+      try {
+        await addParticipants(studyId, number, pseudonyms, together);
+      } catch (thrown) {
+        // The answer was lost. Repeated, the request would add others.
+        setUnsure(faultOf(thrown).reason === "");
+        throw thrown;
+      }
       setCount("");
       setNames("");
       setTried(false);
@@ -369,6 +377,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
         />
       )}
       {fault && <Notice kind="fault">{fault}</Notice>}
+      {unsure && <Notice kind="hint">{words.unsure}</Notice>}
       <div>
         <Button type="submit" busy={busy}>
           {words.submit}

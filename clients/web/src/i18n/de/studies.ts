@@ -177,6 +177,7 @@ export const studies: Texts["studies"] = {
       togetherHint: (size) =>
         `Die ersten ${size} sind eine Gruppe, dann die nächsten. Sonst spielen sie mit denen, mit denen sie ankommen.`,
       wholeGroups: (size) => `Füge ein Vielfaches von ${size} hinzu.`,
+      unsure: "Vielleicht sind sie hinzugefügt: Sieh dir die Teilnehmer unten an, bevor du sie noch einmal hinzufügst.",
       problem: "Gib eine Zahl von 1 bis 1000 ein oder Codes mit höchstens 64 Zeichen.",
     },
     tests: {

@@ -174,6 +174,7 @@ export const studies = {
       togetherHint: (size: number) =>
         `The first ${size} are a group, then the next. Otherwise they play with whom they arrive.`,
       wholeGroups: (size: number) => `Add a multiple of ${size}.`,
+      unsure: "Perhaps they have been added: look at the participants below before you add them again.",
       problem: "Enter a number from 1 to 1000, or codes of at most 64 characters.",
     },
     tests: {

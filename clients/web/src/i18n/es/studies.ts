@@ -175,6 +175,7 @@ export const studies: Texts["studies"] = {
       togetherHint: (size) =>
         `Los primeros ${size} son un grupo, después los siguientes. Si no, juegan con quienes lleguen a la vez.`,
       wholeGroups: (size) => `Añade un múltiplo de ${size}.`,
+      unsure: "Puede que ya estén añadidos: mira los participantes de abajo antes de añadirlos otra vez.",
       problem: "Escribe un número del 1 al 1000, o códigos de 64 caracteres como máximo.",
     },
     tests: {

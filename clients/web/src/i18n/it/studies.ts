@@ -175,6 +175,7 @@ export const studies: Texts["studies"] = {
       togetherHint: (size) =>
         `I primi ${size} sono un gruppo, poi i successivi. Altrimenti giocano con chi arriva insieme a loro.`,
       wholeGroups: (size) => `Aggiungi un multiplo di ${size}.`,
+      unsure: "Forse sono già stati aggiunti: guarda i partecipanti qui sotto prima di aggiungerli di nuovo.",
       problem: "Inserisci un numero da 1 a 1000, o codici di al massimo 64 caratteri.",
     },
     tests: {
