@@ -4,6 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
 import { RecordSummarySchema } from "../src/gen/chefshat/v1/record_service_pb";
 import {
+  AbortReason,
   GameOrigin,
   type Participant,
   ParticipantKind,
@@ -12,7 +13,7 @@ import {
   Visibility,
 } from "../src/gen/chefshat/v1/room_pb";
 import { setLanguage } from "../src/i18n";
-import { ownGame, sum, unratedBecause } from "../src/people/games";
+import { isForfeited, ownGame, sum, unratedBecause } from "../src/people/games";
 import { ratingRange, ratingWords } from "../src/people/rating";
 
 /** A game of Rosa, two built-in agents called greedy, and someone who took the agent's name. */
@@ -88,4 +89,26 @@ test("an unrated game says why", () => {
   ];
   const expected = ["substituted", "hinted", "added", "notDealt", "twice", "recorded", "hidden", "hidden", "wizard"];
   expect(why).toEqual([...expected, null, null]);
+});
+
+test("a game that somebody left is rated as lost by them, also if it was broken off", () => {
+  const names = ["Rosa", "Ben", "Cleo"];
+  const game = create(RecordSummarySchema, {
+    state: RoomState.FINISHED,
+    origin: GameOrigin.DEALT,
+    substituted: true,
+    seats: names.map((name, seat) => ({ seat, name, kind: ParticipantKind.HUMAN, substituted: seat === 1 })),
+  });
+  const lost = (fields: Partial<typeof game>, seat = 1) => isForfeited({ ...game, ...fields }, seat);
+  expect([lost({}), lost({}, 0), unratedBecause(game)]).toEqual([true, false, null]);
+  expect(lost({ visibility: Visibility.PRIVATE })).toBe(false);
+  const aborted = (abortReason: AbortReason, seats = game.seats) =>
+    lost({ state: RoomState.ABORTED, abortReason, seats });
+  expect([AbortReason.CLOSED, AbortReason.PARTICIPANTS_LOST, AbortReason.SHUTDOWN].map((why) => aborted(why))).toEqual([
+    true,
+    true,
+    false,
+  ]);
+  const all = game.seats.map((seat) => ({ ...seat, substituted: true }));
+  expect([aborted(AbortReason.PARTICIPANTS_LOST, all), aborted(AbortReason.CLOSED, all)]).toEqual([false, true]);
 });

@@ -4,7 +4,6 @@ import type { ComponentChildren } from "preact";
 import { wordsOf } from "../api/faults";
 import { useShown } from "../api/pages";
 import { usePolled } from "../api/poll";
-import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 import { dateLocale, decimal, t } from "../i18n";
 import { nameOf } from "../lobby/rooms";
@@ -12,7 +11,7 @@ import { KindBadge } from "../parts/KindBadge";
 import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { type PageProps, pathOf } from "../router";
-import { gamesOf, MAX_LINES, type OwnGame, type Ratings, ratedAs, sum, unratedBecause } from "./games";
+import { gamesOf, isForfeited, MAX_LINES, type OwnGame, type Ratings, ratedAs, sum, unratedBecause } from "./games";
 import css from "./People.module.css";
 import { Fingerprint, PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
@@ -123,8 +122,9 @@ function Fact(props: { label: ComponentChildren; value: string; text: string; wi
   );
 }
 
-/** Why a game is not rated. */
-function NotRated({ record }: { record: RecordSummary }) {
+/** Why a game is not rated, or not by its place. */
+function NotRated({ record, seat }: Pick<OwnGame, "record" | "seat">) {
+  if (isForfeited(record, seat)) return ` · ${t().people.forfeited}`;
   const why = unratedBecause(record);
   return why && ` · ${t().people.notRated(t().people.unrated[why])}`;
 }
@@ -145,7 +145,7 @@ function Games({ games }: { games: readonly OwnGame[] }) {
         </tr>
       </thead>
       <tbody>
-        {games.map(({ record, place, points, others }) => {
+        {games.map(({ record, seat, place, points, others }) => {
           const date = dates.format(Number(record.endedAtMs));
           return (
             <tr key={record.gameId}>
@@ -159,7 +159,7 @@ function Games({ games }: { games: readonly OwnGame[] }) {
                 </a>{" "}
                 <span class="soft small">
                   {record.roomName}
-                  <NotRated record={record} />
+                  <NotRated record={record} seat={seat} />
                 </span>
                 <p class="small">
                   {words.against}{" "}

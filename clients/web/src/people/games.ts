@@ -3,7 +3,14 @@
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
 import { type AskPage, LARGEST_PAGE } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
-import { GameOrigin, type Participant, ParticipantKind, RoomState, Visibility } from "../gen/chefshat/v1/room_pb";
+import {
+  AbortReason,
+  GameOrigin,
+  type Participant,
+  ParticipantKind,
+  RoomState,
+  Visibility,
+} from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 
 /** Most lines of the leaderboard in a response. */
@@ -78,19 +85,37 @@ export type Unrated = "added" | "hidden" | "hinted" | "notDealt" | "recorded" | 
 /** Origins of games that are rated. */
 const RATED_ORIGINS = [GameOrigin.DEALT, GameOrigin.PHYSICAL];
 
+/** How games end early that are rated as lost by those who left or closed them. */
+const BROKEN_OFF = [AbortReason.CLOSED, AbortReason.PARTICIPANTS_LOST];
+
 /** Why a game is not rated, as in server/record/src/rated.rs and docs/ratings.md; null if it is, or was aborted. */
 export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.state !== RoomState.FINISHED) return null;
+  const fixed = unratedFromStart(record);
+  if (fixed) return fixed;
+  // Who was substituted or given a hint has lost the game; records of earlier versions do not say who.
+  const lost = record.seats.filter(({ substituted }) => substituted).length;
+  if (record.substituted && (lost === 0 || lost === record.seats.length)) return "substituted";
+  return record.hinted && lost === 0 ? "hinted" : null;
+}
+
+/** Whether a game is rated as lost by a seat to all others, whatever its place. */
+export function isForfeited(record: RecordSummary, seat: number): boolean {
+  const { seats, state, abortReason } = record;
+  if (!seats.some((one) => one.seat === seat && one.substituted) || unratedFromStart(record)) return false;
+  // If all were lost, the network or the server was.
+  if (seats.every(({ substituted }) => substituted) && abortReason !== AbortReason.CLOSED) return false;
+  return state === RoomState.FINISHED || (state === RoomState.ABORTED && BROKEN_OFF.includes(abortReason));
+}
+
+/** Why a game is not rated, by what was fixed before it began. */
+function unratedFromStart(record: RecordSummary): Unrated | null {
   if (record.added) return "added";
   // In responses, public is unspecified.
   if (record.visibility !== Visibility.UNSPECIFIED) return "hidden";
   if (!RATED_ORIGINS.includes(record.origin)) return "notDealt";
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
   if (record.seats.some(({ shownKind }) => shownKind !== ParticipantKind.UNSPECIFIED)) return "wizard";
-  // Who was substituted or given a hint has lost the game; records of earlier versions do not say who.
-  const lost = record.seats.filter(({ substituted }) => substituted).length;
-  if (record.substituted && (lost === 0 || lost === record.seats.length)) return "substituted";
-  if (record.hinted && lost === 0) return "hinted";
   const participants = record.seats.map(({ kind, name, builtInAgent, nameFingerprint }) => {
     return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name} ${nameFingerprint}`;
   });

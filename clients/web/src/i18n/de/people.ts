@@ -42,6 +42,7 @@ export const people: Texts["people"] = {
     toSee: "In der Liste der Partien eines Teilnehmers steht, warum eine Partie nicht gewertet wird.",
   },
   notRated: (why) => `nicht gewertet: ${why}`,
+  forfeited: "als gegen alle verloren gewertet",
   unrated: {
     added: "anderswo gespielt",
     hidden: "nicht öffentlich",

@@ -38,6 +38,7 @@ export const people = {
     toSee: "A participant’s list of games says why a game is not rated.",
   },
   notRated: (why: string) => `not rated: ${why}`,
+  forfeited: "rated as lost to everyone",
   unrated: {
     added: "played elsewhere",
     hidden: "not public",

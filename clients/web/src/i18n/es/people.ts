@@ -49,6 +49,7 @@ export const people: Texts["people"] = {
     toSee: "La lista de partidas de un participante dice por qué una partida no es puntuable.",
   },
   notRated: (why) => `no puntuable: ${why}`,
+  forfeited: "puntúa como perdida contra todos",
   unrated: {
     added: "jugada en otro sitio",
     hidden: "no es pública",

@@ -46,6 +46,7 @@ export const people: Texts["people"] = {
     toSee: "L’elenco delle partite di un partecipante dice perché una partita non è valutata.",
   },
   notRated: (why) => `non valutata: ${why}`,
+  forfeited: "valutata come persa contro tutti",
   unrated: {
     added: "giocata altrove",
     hidden: "non pubblica",
