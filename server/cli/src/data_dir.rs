@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use chefshat_record::files::{RecordFile, find_records};
+use chefshat_record::files::{Found, find_records};
 use clap::Args;
 use etcetera::BaseStrategy as _;
 
@@ -52,18 +52,25 @@ pub struct RecordsArg {
 }
 
 impl RecordsArg {
-    /// The files of the records.
+    /// The files of the records, at least one, and the paths where none is.
     ///
     /// # Errors
-    /// There are none, or a directory is unreadable.
-    pub fn files(&self) -> Result<Vec<RecordFile>, CommandError> {
+    /// There are none.
+    pub fn find(&self) -> Result<Found, CommandError> {
+        let found = |paths: &[PathBuf]| {
+            let mut found = find_records(paths);
+            match found.files.is_empty() && !found.missing.is_empty() {
+                true => Err(found.missing.swap_remove(0).into()),
+                false => Ok(found),
+            }
+        };
         if !self.paths.is_empty() {
-            return Ok(find_records(&self.paths)?);
+            return found(&self.paths);
         }
         let folder = name(self.data_dir.clone())?;
         let records = folder.join("records");
         if records.is_dir() {
-            return Ok(find_records(&[records])?);
+            return found(&[records]);
         }
         Err(format!(
             "there are no records in {} yet; name files or folders, or choose another data directory with --data-dir",

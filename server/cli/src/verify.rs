@@ -68,12 +68,9 @@ struct Problem {
 
 impl Verify {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let files: Vec<PathBuf> = self
-            .records
-            .files()?
-            .into_iter()
-            .map(|file| file.path)
-            .collect();
+        let found = self.records.find()?;
+        let files: Vec<PathBuf> = found.files.into_iter().map(|file| file.path).collect();
+        let records = files.len() + found.missing.len();
         let bar = progress::of_items(files.len().try_into().unwrap_or(u64::MAX), "records");
         let (mut fitting, mut decisions, mut uncheckable) = (0usize, 0u64, 0u64);
         for files in files.chunks(AT_A_TIME) {
@@ -96,24 +93,32 @@ impl Verify {
             bar.suspend(|| print(&checked, self.json))?;
         }
         bar.finish_and_clear();
+        for missing in found.missing {
+            let problem = Problem {
+                line: None,
+                problem: missing.problem.to_string(),
+                uncheckable: false,
+            };
+            print(&[(&missing.path, Err(problem))], self.json)?;
+        }
         if !self.json {
             let mut out = anstream::stdout().lock();
-            match files.len() - fitting {
+            match records - fitting {
                 0 => writeln!(
                     out,
                     "{} {}, {}",
-                    counted(files.len() as u64, "record"),
+                    counted(records as u64, "record"),
                     if fitting == 1 { "fits" } else { "fit" },
                     counted(decisions, "decision")
                 )?,
-                wrong => writeln!(out, "{wrong} of {} records do not fit", files.len())?,
+                wrong => writeln!(out, "{wrong} of {records} records do not fit")?,
             }
             if uncheckable > 0 {
                 let signatures = counted(uncheckable, "signature");
                 writeln!(out, "{signatures} cannot be checked")?;
             }
         }
-        Ok(match (fitting == files.len(), uncheckable) {
+        Ok(match (fitting == records, uncheckable) {
             (false, _) => ExitCode::FAILURE,
             (true, 0) => ExitCode::SUCCESS,
             (true, _) => ExitCode::from(UNCHECKABLE),

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_dataset::{Export as Exporter, Exported, Filter, Format, Layout};
+use chefshat_dataset::{Export as Exporter, Exported, Filter, Format, Layout, Skipped};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -83,7 +83,7 @@ fn formats() -> impl TypedValueParser<Value = Format> {
 impl Export {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let formats = self.wanted_formats()?;
-        let records = self.records.files()?;
+        let found = self.records.find()?;
         let exporter = Exporter {
             out: self.out.clone(),
             replace: self.force,
@@ -100,11 +100,18 @@ impl Export {
             licence: self.licence.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        let bytes = records.iter().map(|record| record.bytes).sum();
+        let bytes = found.files.iter().map(|record| record.bytes).sum();
         let bar = progress::of_record_bytes(bytes);
-        let result = exporter.run(&records, |bytes| bar.inc(bytes));
+        let result = exporter.run(&found.files, |bytes| bar.inc(bytes));
         bar.finish_and_clear();
-        let exported = result?;
+        let mut exported = result?;
+        exported.damaged += found.missing.len() as u64;
+        exported
+            .skipped
+            .extend(found.missing.into_iter().map(|missing| Skipped {
+                path: missing.path,
+                problem: missing.problem.to_string(),
+            }));
         let mut out = anstream::stdout().lock();
         if self.json {
             writeln!(out, "{}", self.json_report(&exported))?;

@@ -73,8 +73,12 @@ struct Gathered {
 
 impl RatingsCommand {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
-        let files = self.records.files()?;
-        let gathered = self.gather(&files)?;
+        let found = self.records.find()?;
+        let mut gathered = self.gather(&found.files)?;
+        for missing in found.missing {
+            anstream::eprintln!("chefshat: left out {missing}");
+            gathered.damaged += 1;
+        }
         let kind = kind_filter(self.kind);
         let board = leaderboard(&gathered.ratings, kind, self.min_games, usize::MAX);
         let mut out = anstream::stdout().lock();

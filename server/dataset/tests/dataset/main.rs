@@ -64,7 +64,7 @@ impl Stage {
     }
 
     fn run(&self, export: &Export) -> Result<Exported, ExportError> {
-        export.run(&find_records(&[self.records()]).unwrap(), |_| {})
+        export.run(&find_records(&[self.records()]).files, |_| {})
     }
 
     fn rows(&self, table: &str) -> Vec<Value> {

@@ -169,6 +169,18 @@ fn damaged_records_are_left_out_and_named() {
     );
     assert!(ended.stderr.contains("--skip-damaged"), "{ended:?}");
     assert!(ended.stdout.contains(": 1 game, "), "{ended:?}");
+    let missing = stage.path("missing.jsonl");
+    let flags = format!(
+        "--force --skip-damaged {} {}",
+        text(&missing),
+        text(&records)
+    );
+    let ended = stage.export(&flags).well();
+    assert!(
+        ended.stderr.contains("missing.jsonl: No such file"),
+        "{ended:?}"
+    );
+    assert!(ended.stdout.contains(": 1 game, "), "{ended:?}");
     let ended = stage.export("--skip-damaged --force").well();
     assert!(ended.stderr.contains("skipped: ") && ended.stderr.contains(&name));
     assert!(ended.stdout.contains(": 1 game, "));
@@ -226,7 +238,7 @@ fn a_folder_named_like_a_record_is_ignored() {
     let ended = stage.export(&format!("--force {}", text(&named)));
     assert_eq!(ended.code, Some(1));
     assert!(
-        ended.stderr.contains("old.jsonl contains no records"),
+        ended.stderr.contains("old.jsonl: contains no records"),
         "{ended:?}"
     );
 }

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use chefshat_record::atomic_file::AtomicFile;
-use chefshat_record::files::{FindError, find_records};
+use chefshat_record::files::{FindProblem, find_records};
 use chefshat_record::jsonl;
 
 fn names(folder: &Path) -> Vec<String> {
@@ -33,7 +33,9 @@ fn records_are_found_in_files_and_folders() {
     }
     let found = |paths: &[&str]| {
         let paths: Vec<PathBuf> = paths.iter().map(|path| at(path)).collect();
-        let found = find_records(&paths).unwrap();
+        let found = find_records(&paths);
+        assert!(found.missing.is_empty(), "{:?}", found.missing);
+        let found = found.files;
         assert!(found.iter().all(|file| file.bytes == 5));
         let name = |path: &Path| path.strip_prefix(folder.path()).unwrap().to_owned();
         let found = found.into_iter().map(|file| name(&file.path));
@@ -53,10 +55,15 @@ fn records_are_found_in_files_and_folders() {
         expected(&["records/old.jsonl/z.jsonl"])
     );
     std::fs::create_dir(at("empty")).unwrap();
-    let nothing = find_records(&[at("records"), at("empty")]);
-    assert!(matches!(nothing, Err(FindError::NoRecords(path)) if path == at("empty")));
-    let nowhere = find_records(&[at("nowhere")]);
-    assert!(matches!(nowhere, Err(FindError::Unreadable { .. })));
+    // What is missing hides nothing of the others.
+    let found = find_records(&[at("empty"), at("records"), at("nowhere"), at("named.txt")]);
+    assert_eq!(found.files.len(), 3);
+    let [empty, nowhere] = found.missing.as_slice() else {
+        panic!("{:?}", found.missing)
+    };
+    assert_eq!((&empty.path, &nowhere.path), (&at("empty"), &at("nowhere")));
+    assert!(matches!(empty.problem, FindProblem::NoRecords));
+    assert!(matches!(nowhere.problem, FindProblem::Unreadable(_)));
 }
 
 #[test]
