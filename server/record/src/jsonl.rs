@@ -12,6 +12,7 @@ use chefshat_proto::v1::{RecordLine, record_line::Line};
 use crate::atomic_file::{AtomicFile, WriteError};
 use crate::private;
 use crate::signature::TextHash;
+use crate::words::printable;
 pub use lists::{Excess, excess};
 
 /// The format version that this crate writes, and the newest it reads.
@@ -330,7 +331,8 @@ fn parse(bytes: &[u8]) -> Result<RecordLine, LineProblem> {
             .rsplit_once(" at line ")
             .map_or(message.as_str(), |(message, _)| message);
         if error.is_data() {
-            LineProblem::NotARecord(message.to_owned())
+            // It quotes the line, which could otherwise write anything to a terminal.
+            LineProblem::NotARecord(printable(message))
         } else {
             LineProblem::NotJson(format!("{message} (column {})", error.column()))
         }

@@ -38,6 +38,11 @@ pub fn ordinal(place: u32) -> String {
     format!("{place}{ending}")
 }
 
+/// A text of unknown origin without control characters, which a terminal would obey.
+pub fn printable(text: &str) -> String {
+    text.replace(char::is_control, "\u{fffd}")
+}
+
 /// Whether words can be said whole.
 pub fn fits(words: &str) -> bool {
     encoded(words).len() <= MAX_MEDIA

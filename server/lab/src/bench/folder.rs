@@ -12,6 +12,7 @@ use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
 use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::jsonl;
+use chefshat_record::words::printable;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -273,7 +274,8 @@ fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
         return Err(problem(&"not a file of a submission"));
     }
     let text = fs::read(path).map_err(|error| problem(&error))?;
-    serde_json::from_slice(&text).map_err(|error| problem(&error))
+    // An error quotes the file.
+    serde_json::from_slice(&text).map_err(|error| problem(&printable(&error.to_string())))
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {

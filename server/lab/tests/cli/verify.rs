@@ -101,6 +101,40 @@ fn a_damaged_record_is_reported() {
 }
 
 #[test]
+fn a_missing_record_does_not_hide_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let nowhere = folder.path().join("nowhere.jsonl");
+    let (nowhere, fixed) = (nowhere.to_str().unwrap(), fixture("records/fixed.jsonl"));
+    let ended = chefshat(&["verify", nowhere, fixed.to_str().unwrap()]).ended_with(1);
+    ended.assert_says(&[
+        "fixed.jsonl: fits: finished",
+        "nowhere.jsonl: No such file",
+        "1 of 2 records do not fit",
+    ]);
+    let ended = chefshat(&["verify", "--json", nowhere, fixed.to_str().unwrap()]).ended_with(1);
+    let fits: Vec<_> = ended
+        .json_lines()
+        .iter()
+        .map(|it| it["fits"].clone())
+        .collect();
+    assert_eq!(fits, [true, false]);
+}
+
+#[test]
+fn a_record_writes_no_control_characters_to_a_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("game.jsonl");
+    std::fs::write(&path, "{\"\\u001b[2K\\rgame.jsonl: fits\": 1}\n").unwrap();
+    for json in [false, true] {
+        let mut arguments = vec!["verify", path.to_str().unwrap()];
+        arguments.extend(json.then_some("--json"));
+        let ended = chefshat(&arguments).ended_with(1);
+        assert!(!ended.stdout.contains(['\x1b', '\r']), "{ended:?}");
+        ended.assert_says(&["unknown field"]);
+    }
+}
+
+#[test]
 fn missing_records_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let nowhere = folder.path().join("nowhere");

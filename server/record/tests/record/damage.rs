@@ -206,6 +206,8 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("a blank line", Bytes(40, Vec::new()), 40, "is not JSON"),
         ("no JSON", Bytes(40, b"{\"event\": }".to_vec()), 40, "is not JSON: expected value (column 11)"),
         ("other JSON", Bytes(40, b"{\"match\":1}".to_vec()), 40, "is not a line of a record: unknown field `match`"),
+        ("what moves a cursor", Bytes(40, br#"{"\u001b[1A\u001b[2Kfits\u009b":1}"#.to_vec()), 40, "unknown field `\u{fffd}[1A\u{fffd}[2Kfits\u{fffd}`"),
+        ("a value that moves a cursor", Bytes(40, br#"{"event":{"pass":{"source":"\u001b[2J"}}}"#.to_vec()), 40, "unknown variant `\u{fffd}[2J`"),
         ("no text", Bytes(40, b"{\"event\":\"\xff\"}".to_vec()), 40, "is not UTF-8 text (at byte 11"),
         ("a line without end", Bytes(40, vec![b' '; MAX_LINE_BYTES]), 40, "is longer than 262144 bytes"),
     ]

@@ -36,7 +36,9 @@ fn edited_records_are_verified_or_refused() {
         .with_iterations(RUNS)
         .for_each(|edits| {
             std::fs::write(&file, edits.apply(&original)).unwrap();
-            let _ = replays(&file);
+            if let Err(problem) = replays(&file) {
+                assert!(!problem.contains(char::is_control), "{problem:?}");
+            }
         });
 }
 
