@@ -21,7 +21,6 @@ pub const MAX_CHANNELS: usize = 16;
 pub const MAX_NAME: usize = 32;
 /// Largest encoded chunk, bytes. Those that a server accepts are smaller.
 const MAX_CHUNK_BYTES: usize = 256 * 1024;
-/// Ending of the files.
 /// What the name of a file of samples ends with.
 pub const ENDING: &str = "samples";
 
@@ -35,10 +34,15 @@ pub fn path_of(data_dir: &Path, game_id: &str, seat: usize) -> PathBuf {
     folder_of(data_dir).join(format!("{game_id}.{seat}.{ENDING}"))
 }
 
-/// The file of a seat's samples beside a record in the folder `records` of a data directory.
+/// The file of a seat's samples beside a record in the folder `records` of a data directory. The
+/// record may be named relative to any folder.
 pub fn beside(record: &Path, game_id: &str, seat: usize) -> Option<PathBuf> {
-    let data_dir = record.parent()?.parent()?;
-    Some(path_of(data_dir, game_id, seat))
+    let record = std::path::absolute(record).ok()?;
+    let mut records = record.parent()?.to_owned();
+    if records.ends_with("..") {
+        records = records.canonicalize().ok()?;
+    }
+    Some(path_of(records.parent()?, game_id, seat))
 }
 
 /// Deletes the samples of all seats of a game in a data directory.
@@ -199,6 +203,23 @@ mod tests {
         assert!(read(&path, |_| {}).is_err(), "something else");
         std::fs::write(&path, [0xff; 8]).expect("written");
         assert!(read(&path, |_| {}).is_err(), "too long");
+    }
+
+    #[test]
+    fn samples_are_found_beside_a_record_however_it_is_named() {
+        let here = std::env::current_dir().expect("a folder");
+        let above = here.parent().expect("it is not the root");
+        let higher = above.parent().expect("it is not the root");
+        let full = here.join("game.jsonl");
+        for (record, data_dir) in [
+            (Path::new("game.jsonl"), above),
+            (Path::new("./game.jsonl"), above),
+            (full.as_path(), above),
+            (Path::new("../game.jsonl"), higher),
+        ] {
+            let expected = Some(path_of(data_dir, "game", 2));
+            assert_eq!(beside(record, "game", 2), expected, "{record:?}");
+        }
     }
 
     #[test]

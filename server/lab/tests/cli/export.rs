@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Ended, chefshat, typed};
+use super::run::{Ended, chefshat, program, typed};
 
 /// A folder that contains a data folder with simulated records.
 struct Stage {
@@ -208,6 +208,15 @@ fn damaged_samples_are_named_and_the_rest_is_exported() {
     let said = stage.export("--skip-damaged --force --json").well().json();
     let left_out = said["left_out"][0]["path"].as_str().unwrap();
     assert!(left_out.ends_with(&samples), "{left_out}");
+    // They are found beside records that are named relative to their own folder.
+    for (records, out) in [(".", "all"), (name.as_str(), "one")] {
+        let mut export = program();
+        export.current_dir(stage.path("data/records"));
+        export.args(["export", records, "--out", text(&stage.path(out))]);
+        let ended = Ended::of(export.output().unwrap());
+        assert_eq!(ended.code, Some(1), "{records}: {ended:?}");
+        assert!(ended.stderr.contains(&samples), "{records}: {ended:?}");
+    }
 }
 
 #[test]
