@@ -28,7 +28,7 @@ use chefshat_server::convert::leaderboard;
 use chefshat_server::tournaments::finish;
 
 const HELP: &str = "\
-A game is rated if it was dealt from the server's own seed and each seat had a different participant. A participant who left it, broke it off or was \
+A game is rated if it was public, was dealt from a server's own seed, and each seat had a different participant. A participant who left it, broke it off or was \
 given a hint has lost it. Every record is replayed first. Games count once, in the order in which they ended. A rating is a mean with its deviation: \
 the skill lies within 1.96 deviations with a confidence of 95 %. Participants are sorted by the mean minus two deviations. \
 docs/ratings.md says how reliable these numbers are.

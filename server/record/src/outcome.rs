@@ -138,11 +138,13 @@ pub(crate) fn add_choice(choices: &mut OwnChoices, decision: &v1::DecisionRecord
 /// Why a finished game is unrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Unrated {
-    /// The deals came from a given seed or hands, or the game was imported.
-    #[error(
-        "the deals came neither from a seed committed by the server nor from the cards of a physical room"
-    )]
+    /// The deals came from a given seed or hands or, for a leaderboard, from real cards; or the game
+    /// was imported.
+    #[error("the deals did not come from a seed committed by the server")]
     NotDealt,
+    /// The game was private or unlisted.
+    #[error("the game was not public")]
+    NotPublic,
     /// A substitute played for a participant.
     #[error("a substitute played")]
     Substituted,
@@ -168,6 +170,7 @@ impl Unrated {
     pub fn name(self) -> &'static str {
         match self {
             Self::NotDealt => "not_dealt",
+            Self::NotPublic => "not_public",
             Self::Substituted => "substituted",
             Self::Hinted => "hinted",
             Self::SameParticipant => "same_participant",

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use chefshat_proto::v1::{self, AbortReason, GameOrigin, ParticipantKind, RoomState};
+use chefshat_proto::v1::{self, AbortReason, GameOrigin, ParticipantKind, RoomState, Visibility};
 
 use crate::outcome::{Identity, Unrated};
 
@@ -28,8 +28,15 @@ pub struct RatedSeat {
 /// The game is not rated.
 pub fn rated(summary: &v1::RecordSummary) -> Result<Vec<RatedSeat>, Unrated> {
     let seats = &summary.seats;
-    if !matches!(summary.origin(), GameOrigin::Dealt | GameOrigin::Physical) {
+    if summary.origin() != GameOrigin::Dealt {
         return Err(Unrated::NotDealt);
+    }
+    // Who plays such a game is shown to nobody else.
+    if matches!(
+        summary.visibility(),
+        Visibility::Unlisted | Visibility::Private
+    ) {
+        return Err(Unrated::NotPublic);
     }
     if seats.iter().any(|seat| seat.replay.is_some()) {
         return Err(Unrated::RecordedPlayer);

@@ -31,6 +31,7 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
                 summary.created_at_ms = header.created_at_ms;
                 summary.rules.clone_from(&header.rules);
                 summary.seats.clone_from(&header.seats);
+                summary.visibility = (header.policy.as_ref()).map_or(0, |policy| policy.visibility);
             }
             Line::Event(event) => {
                 summary.ended_at_ms = summary.created_at_ms.saturating_add(event.elapsed_ms);

@@ -321,6 +321,13 @@ impl RecordService for Records {
         let (lines, _memory) = receiving.map_err(|_| import_too_slow())??;
         let replaying = move || {
             let summary = replay::replay(&lines).map(|replayed| summary(&lines, &replayed));
+            // On this server it is public, whatever it was where it was played.
+            let summary = summary.map(|summary| {
+                summary.map(|summary| v1::RecordSummary {
+                    visibility: v1::Visibility::Unspecified.into(),
+                    ..summary
+                })
+            });
             (Arc::<[v1::RecordLine]>::from(lines), summary)
         };
         let (lines, summary) = self.recorded.with_place(key, replaying).await?;

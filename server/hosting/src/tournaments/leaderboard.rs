@@ -179,10 +179,7 @@ async fn read_on(store: &dyn Store, mut folded: Folded) -> Result<Folded, Comput
 
 /// The results of a rated game; `None` if it is not rated.
 fn results(summary: &v1::RecordSummary) -> Option<Vec<(Identity, Finish)>> {
-    // What is not listed elsewhere does not show here either.
-    let is_public = summary.visibility() == v1::Visibility::Unspecified;
-    let seats = rated(summary).ok().filter(|_| is_public)?;
-    Some(seats.into_iter().map(finish).collect())
+    Some(rated(summary).ok()?.into_iter().map(finish).collect())
 }
 
 /// The result of a participant, for ratings.

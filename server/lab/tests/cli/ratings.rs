@@ -1,5 +1,7 @@
 //! `chefshat ratings`: a leaderboard from records, each game counted once.
 
+use std::iter;
+
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -7,16 +9,18 @@ use super::run::{chefshat, fixture, run, serve, until_recorded};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
 
-/// Plays a number of games of built-in agents on a server. Returns its data folder and its
-/// leaderboard.
+/// Plays a number of games of built-in agents on a server, and two that are not public. Returns its
+/// data folder and its leaderboard.
 fn played(games: usize) -> (TempDir, Value) {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
-    for _ in 0..games {
+    let hidden = ["private", "unlisted"];
+    for visibility in iter::repeat_n("public", games).chain(hidden) {
         let seats = AGENTS.map(|agent| format!(" --seat {agent}")).concat();
-        run(&url, &format!("room create --target-shifts 1{seats}")).well();
+        let room = format!("room create --target-shifts 1 --visibility {visibility}{seats}");
+        run(&url, &room).well();
     }
-    until_recorded(games, folder.path());
+    until_recorded(games + hidden.len(), folder.path());
     let board = run(&url, "leaderboard --json").json();
     (folder, board)
 }
@@ -40,10 +44,11 @@ fn a_leaderboard_is_recomputed_from_the_records() {
     let printed = chefshat(&["ratings", "--json", records, fixtures, copies])
         .well()
         .json();
-    assert_eq!(printed["records"], 14);
+    assert_eq!(printed["records"], 16);
     // A participant that was substituted has lost the game.
     assert_eq!(printed["rated_games"], 13);
-    assert_eq!(printed["not_rated"], json!({"not_dealt": 1}));
+    let not_rated = json!({"not_dealt": 1, "not_public": 2});
+    assert_eq!(printed["not_rated"], not_rated);
     // The numbers equal the server's.
     let printed = chefshat(&["ratings", "--json", records, copies])
         .well()
@@ -74,7 +79,7 @@ fn a_leaderboard_is_recomputed_from_the_records() {
 
     let table = chefshat(&["ratings", "--data-dir", data_dir]).well();
     table.assert_table_fits(5);
-    assert!(table.stdout.starts_with("12 rated games of 12 records\n"));
+    assert!(table.stdout.starts_with("12 rated games of 14 records\n"));
     let sheet = chefshat(&["ratings", "--csv", records]).well().stdout;
     assert_eq!(sheet.lines().count(), 5, "{sheet}");
     assert!(sheet.starts_with("place,name,kind,mean,deviation,games,place_1,"));

@@ -4,7 +4,9 @@ use crate::fixture;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
-
+use chefshat_record::rated::rated;
+use chefshat_record::replay::replay;
+use chefshat_record::summary::summary;
 use chefshat_record::testing::{TestGame, header};
 
 fn rules() -> RuleSet {
@@ -242,6 +244,36 @@ fn games_that_do_not_show_skill_are_not_rated() {
     ];
     for (number, (change, expected)) in cases.into_iter().enumerate() {
         assert_eq!(unrated(change), expected, "case {number}");
+    }
+}
+
+#[test]
+fn a_leaderboard_rates_public_games_that_a_server_dealt() {
+    let mut lines = fixture("committed.jsonl");
+    let replayed = replay(&lines).unwrap();
+    let mut reason = |origin: v1::GameOrigin, visibility: v1::Visibility| {
+        let header = header(&mut lines);
+        header.origin = origin.into();
+        header.policy.as_mut().unwrap().visibility = visibility.into();
+        let summary = summary(&lines, &replayed).unwrap();
+        assert_eq!(summary.visibility(), visibility);
+        rated(&summary).err()
+    };
+    use v1::GameOrigin::{Dealt, FixedSeed, Physical};
+    use v1::Visibility::{Private, Public, Unlisted, Unspecified};
+    for (origin, visibility, expected) in [
+        (Dealt, Unspecified, None),
+        (Dealt, Public, None),
+        (Dealt, Unlisted, Some(Unrated::NotPublic)),
+        (Dealt, Private, Some(Unrated::NotPublic)),
+        (Physical, Unspecified, Some(Unrated::NotDealt)),
+        (FixedSeed, Unspecified, Some(Unrated::NotDealt)),
+    ] {
+        assert_eq!(
+            reason(origin, visibility),
+            expected,
+            "{origin:?}, {visibility:?}"
+        );
     }
 }
 
