@@ -138,18 +138,30 @@ fn by_exchange(upper: &[Scored], lower: &[Scored]) -> Option<f64> {
     if most > MOST_EXACT {
         return None;
     }
-    let mut sums = BTreeMap::from([(0, 1.0)]);
-    for difference in &differences {
-        let mut next: BTreeMap<i64, f64> = BTreeMap::new();
-        for (sum, probability) in sums {
-            *next.entry(sum + difference).or_default() += 0.5 * probability;
-            *next.entry(sum - difference).or_default() += 0.5 * probability;
+    Some(as_large_by_chance(&differences))
+}
+
+/// The probability that the sum of these differences, each with either sign by a toss of a coin, is
+/// at least as far from 0 as with the signs that they have. A tournament of a thousand asks for a
+/// thousand of these, so the sums are numbered: for each difference, the work is that of adding
+/// two lists of at most [`MOST_EXACT`] numbers.
+fn as_large_by_chance(differences: &[i64]) -> f64 {
+    let most: i64 = differences.iter().map(|difference| difference.abs()).sum();
+    // Sums differ by twice a difference, so the one at `index` is `2 * index - most`.
+    let mut sums = vec![1.0];
+    for difference in differences {
+        let shift = usize::try_from(difference.abs()).expect("it is not negative");
+        let mut next = vec![0.0; sums.len() + shift];
+        for (index, probability) in sums.iter().enumerate() {
+            next[index] += 0.5 * probability;
+            next[index + shift] += 0.5 * probability;
         }
         sums = next;
     }
     let found = differences.iter().sum::<i64>().abs();
-    let as_large = sums.iter().filter(|(sum, _)| sum.abs() >= found);
-    Some(as_large.map(|(_, probability)| probability).sum())
+    let sums = (0..).map(|index| 2 * index - most).zip(&sums);
+    let as_large = sums.filter(|(sum, _)| sum.abs() >= found);
+    as_large.map(|(_, probability)| probability).sum()
 }
 
 /// The probability that this many tosses of a coin all show the same side: no difference found on
@@ -291,6 +303,36 @@ mod tests {
         );
         assert_eq!(with(1.0).confidence, 0.9375);
         assert_eq!((with(-1.0).difference, with(-1.0).confidence), (0.0, 0.5));
+    }
+
+    #[test]
+    fn the_exact_probability_is_that_of_all_tosses() {
+        // As for each sum that there is, which are few.
+        let by_sums = |differences: &[i64]| -> f64 {
+            let mut sums = BTreeMap::from([(0, 1.0)]);
+            for difference in differences {
+                let mut next: BTreeMap<i64, f64> = BTreeMap::new();
+                for (sum, probability) in sums {
+                    *next.entry(sum + difference).or_default() += 0.5 * probability;
+                    *next.entry(sum - difference).or_default() += 0.5 * probability;
+                }
+                sums = next;
+            }
+            let found = differences.iter().sum::<i64>().abs();
+            let as_large = sums.iter().filter(|(sum, _)| sum.abs() >= found);
+            as_large.map(|(_, probability)| probability).sum()
+        };
+        assert_eq!(as_large_by_chance(&[]), 1.0);
+        let mut seed = 1_u64;
+        for occasions in 1..=200 {
+            let mut differences = Vec::new();
+            for _ in 0..occasions {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                differences.push((seed >> 33) as i64 % 11 - 5);
+            }
+            let (found, expected) = (as_large_by_chance(&differences), by_sums(&differences));
+            assert_eq!(found.to_bits(), expected.to_bits(), "{differences:?}");
+        }
     }
 
     #[test]
