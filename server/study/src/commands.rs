@@ -233,6 +233,7 @@ impl Study {
         &self,
         joined: Joined,
         device: Option<&Device>,
+        now_ms: u64,
     ) -> Result<(u32, Option<Change>), Refusal> {
         let recruiting = &self.settings().recruiting;
         if !recruiting.open_link {
@@ -248,6 +249,9 @@ impl Study {
         let mut others = self.participants().values();
         if has_id && others.any(|other| other.panel_id() == joined.panel_id) {
             return Err(Refusal::PanelIdTaken);
+        }
+        if self.is_closed_at(now_ms) {
+            return Err(Refusal::Closed);
         }
         let mut change = self.add(&NewParticipants::numbered(1))?.pop();
         if !self.has_place(false, None) {
@@ -275,7 +279,7 @@ impl Study {
         let participant = self.known(number)?;
         let has_place = || self.has_place(participant.test, participant.planned);
         let slot = match participant.status {
-            Status::Invited if self.is_closed() => return Err(Refusal::Closed),
+            Status::Invited if self.is_closed_at(now_ms) => return Err(Refusal::Closed),
             Status::Invited if !has_place() => return Err(Refusal::Full),
             Status::Invited => {
                 let settings = self.settings();

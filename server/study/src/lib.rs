@@ -88,6 +88,10 @@ use earlier::EarlierAnswers;
 use presence::Presence;
 use state::StudyState;
 
+/// For how long the date of a study must have passed before the study is closed, in milliseconds: a
+/// clock may jump ahead and back, and what is closed stays closed.
+pub const CONFIRMATION_TIME_MS: u64 = 600_000;
+
 /// A study. Two are equal if their changes have led to the same state; who is connected does not
 /// matter.
 #[derive(Debug, Clone)]
@@ -97,6 +101,8 @@ pub struct Study {
     step_count: usize,
     state: StudyState,
     presence: Presence,
+    /// Since when its date has passed whenever [`Study::next`] was asked.
+    past_date_since_ms: Option<u64>,
 }
 
 impl PartialEq for Study {
@@ -121,6 +127,7 @@ impl Study {
             step_count,
             state: StudyState::new(step_count),
             presence: Presence::default(),
+            past_date_since_ms: None,
         })
     }
 
@@ -138,6 +145,11 @@ impl Study {
     /// Whether nobody may begin any more.
     pub fn is_closed(&self) -> bool {
         self.state.closed
+    }
+
+    /// Whether nobody may begin at this time: the study is closed, or its date has passed.
+    fn is_closed_at(&self, now_ms: u64) -> bool {
+        self.is_closed() || (self.settings.end_ms()).is_some_and(|at_ms| at_ms <= now_ms)
     }
 
     /// The participants, by number from 1.
@@ -285,9 +297,13 @@ impl Study {
     /// or a participant drops out or is left over. To be folded before the next are asked for.
     /// `elapsed_ms`: as for [`Study::set_connected`].
     pub fn next(&mut self, now_ms: u64, elapsed_ms: u64) -> Vec<Change> {
-        let closes_at = self.settings.end_ms();
-        if closes_at.is_some_and(|at_ms| at_ms <= now_ms) && !self.is_closed() {
-            return vec![Change::Closed];
+        if self.is_closed() || !self.is_closed_at(now_ms) {
+            self.past_date_since_ms = None;
+        } else {
+            let since_ms = *self.past_date_since_ms.get_or_insert(elapsed_ms);
+            if elapsed_ms.saturating_sub(since_ms) >= CONFIRMATION_TIME_MS {
+                return vec![Change::Closed];
+            }
         }
         let grouped = self.next_of_groups(now_ms, elapsed_ms);
         if !grouped.is_empty() {
@@ -313,9 +329,14 @@ impl Study {
         let groups = self.settings.groups;
         let waited = groups.and_then(|it| self.presence.next_waited_ms(it.wait_ms, elapsed_ms));
         let by_presence = drop_out.into_iter().chain(waited).min();
-        let close = self.settings.end_ms().filter(|_| !self.is_closed());
         let by_presence = by_presence.map(|at_ms| at_ms.saturating_sub(elapsed_ms));
-        let close = close.map(|at_ms| at_ms.saturating_sub(now_ms));
+        let close = match (self.past_date_since_ms, self.settings.end_ms()) {
+            (Some(since_ms), _) => {
+                Some((since_ms + CONFIRMATION_TIME_MS).saturating_sub(elapsed_ms))
+            }
+            (None, end_ms) => end_ms.map(|at_ms| at_ms.saturating_sub(now_ms)),
+        };
+        let close = close.filter(|_| !self.is_closed());
         by_presence.into_iter().chain(close).min()
     }
 

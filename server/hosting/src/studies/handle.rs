@@ -272,8 +272,8 @@ impl StudyHandle {
         }
         let data = Arc::clone(&self.shared.data);
         let memory = data.for_participants(key, slice::from_ref(&joined.panel_id))?;
-        self.command(move |study, _| {
-            let (number, change) = study.join(joined, device.as_ref())?;
+        self.command(move |study, now_ms| {
+            let (number, change) = study.join(joined, device.as_ref(), now_ms)?;
             if change.is_some() {
                 data.keep_participants(memory);
             }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use chefshat_study::testing::{settings, text, within};
 use chefshat_study::{
-    At, Change, Content, Device, End, NewParticipants, Pointer, Refusal, RequiredDevice, Settings,
-    Stage, Status, Study, Task,
+    At, CONFIRMATION_TIME_MS, Change, Content, Device, End, NewParticipants, Pointer, Refusal,
+    RequiredDevice, Settings, Stage, Status, Study, Task,
 };
 
 use super::support::{Lab, device, tests};
@@ -300,7 +300,13 @@ fn a_full_or_closed_study_accepts_nobody() {
     lab.wait(0);
     assert_eq!(lab.wake_in(), Some(2_000_000 - lab.now_ms));
     lab.wait(1_000_000);
+    assert_eq!(lab.open(2), Err(Refusal::Closed));
+    assert_eq!(lab.wake_in(), Some(CONFIRMATION_TIME_MS));
+    lab.wait(CONFIRMATION_TIME_MS - 1);
+    assert!(!lab.study.is_closed());
+    lab.wait(1);
     assert!(lab.study.is_closed() && lab.study.close().is_none());
+    assert_eq!(lab.wake_in(), None);
     assert_eq!(lab.open(2), Err(Refusal::Closed));
     assert_eq!(
         lab.study.add(&NewParticipants::numbered(1)),
@@ -312,6 +318,26 @@ fn a_full_or_closed_study_accepts_nobody() {
 }
 
 #[test]
+fn a_clock_that_was_ahead_closes_no_study() {
+    let mut settings = settings();
+    settings.closes_at_ms = Some(2_000_000);
+    let mut lab = Lab::new(settings, 1);
+    let (now_ms, ahead_ms) = (lab.now_ms, 3_000_000);
+    lab.now_ms = ahead_ms;
+    assert_eq!(lab.open(1), Err(Refusal::Closed));
+    // Right again when it is asked next, however late that is.
+    let elapsed_ms = [0, 1, 2 * CONFIRMATION_TIME_MS, 3 * CONFIRMATION_TIME_MS];
+    for (at_ms, elapsed_ms) in [ahead_ms, now_ms, ahead_ms, now_ms]
+        .into_iter()
+        .zip(elapsed_ms)
+    {
+        assert_eq!(lab.study.next(at_ms, elapsed_ms), []);
+    }
+    lab.now_ms = now_ms;
+    lab.begin(1);
+}
+
+#[test]
 fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
     let mut settings = settings();
     settings.deletes_at_ms = Some(2_000_000);
@@ -320,6 +346,7 @@ fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
     assert_eq!(lab.study.view(1).unwrap().deletes_at_ms, Some(2_000_000));
     assert_eq!(lab.wake_in(), Some(2_000_000 - lab.now_ms));
     lab.wait(1_000_000);
+    lab.wait(CONFIRMATION_TIME_MS);
     assert!(lab.study.is_closed());
     // Before it closes, or given in microseconds.
     for (closes_at_ms, deletes_at_ms) in [(2_000_001, 2_000_000), (0, 1_900_000_000_000_000)] {

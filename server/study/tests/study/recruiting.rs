@@ -26,6 +26,9 @@ fn recruited() -> Settings {
     }
 }
 
+/// When participants join.
+const NOW_MS: u64 = 1000;
+
 fn joining(request: u8, panel_id: &str) -> Joined {
     Joined {
         request_sha256: [request; 32],
@@ -34,7 +37,7 @@ fn joining(request: u8, panel_id: &str) -> Joined {
 }
 
 fn join(study: &mut Study, request: u8, panel_id: &str) -> Result<u32, Refusal> {
-    let (number, change) = study.join(joining(request, panel_id), Some(&device()))?;
+    let (number, change) = study.join(joining(request, panel_id), Some(&device()), NOW_MS)?;
     if let Some(change) = change {
         study.fold(&change);
     }
@@ -91,6 +94,7 @@ fn on_another_device_nobody_joins() {
     };
     let mut study = Study::new(Settings {
         device: Some(required),
+        closes_at_ms: Some(NOW_MS + 1),
         ..recruited()
     })
     .unwrap();
@@ -99,17 +103,22 @@ fn on_another_device_nobody_joins() {
         ..device()
     };
     for device in [None, Some(&narrow)] {
-        let refused = study.join(joining(1, "a"), device).unwrap_err();
+        let refused = study.join(joining(1, "a"), device, NOW_MS).unwrap_err();
         assert_eq!(refused, Refusal::WrongDevice(required));
     }
     assert_eq!(join(&mut study, 1, "a"), Ok(1));
     // Who has joined finds the link again, also there.
-    assert_eq!(study.join(joining(1, "a"), None), Ok((1, None)));
+    assert_eq!(study.join(joining(1, "a"), None, NOW_MS), Ok((1, None)));
     // Without a place, another device would not help.
+    let join = |study: &Study, now_ms| study.join(joining(2, "b"), None, now_ms).unwrap_err();
+    let wrong = Refusal::WrongDevice(required);
+    assert_eq!(
+        (join(&study, NOW_MS), join(&study, NOW_MS + 1)),
+        (wrong, Refusal::Closed)
+    );
     let close = study.close().expect("it is open");
     study.fold(&close);
-    let late = study.join(joining(2, "b"), None);
-    assert_eq!(late.unwrap_err(), Refusal::Closed);
+    assert_eq!(join(&study, NOW_MS), Refusal::Closed);
 }
 
 #[test]
@@ -151,7 +160,9 @@ fn participants_go_on_where_the_panel_says() {
 
 #[test]
 fn the_id_at_the_panel_is_deleted_with_the_data() {
-    let (_, added) = folded(&[]).join(joining(1, "secret"), None).unwrap();
+    let (_, added) = folded(&[])
+        .join(joining(1, "secret"), None, NOW_MS)
+        .unwrap();
     let mut changes = vec![added.unwrap()];
     changes.extend(folded(&changes).open(1, Some(device()), 1000).unwrap());
     changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());
