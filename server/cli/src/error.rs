@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{self, Write as _};
+use std::process::ExitCode;
 
 /// Why a command failed, as a message for the user.
 pub type CommandError = Box<dyn std::error::Error + Send + Sync>;
@@ -14,6 +15,18 @@ pub fn say(line: impl Display) -> Result<(), CommandError> {
 /// Writes a line to standard error, for a program that runs on if nobody can read it.
 pub(crate) fn tell(line: impl Display) {
     let _ = writeln!(anstream::stderr().lock(), "{line}");
+}
+
+/// The exit code of a command that has printed all it has to say, also if the reader of the output
+/// has closed it before.
+///
+/// # Errors
+/// The output cannot be written for another reason.
+pub fn after_printing(printed: io::Result<()>, code: ExitCode) -> Result<ExitCode, CommandError> {
+    match printed {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(code),
+    }
 }
 
 /// Whether the reader of the output has closed it, as `head` does. A command returns this error

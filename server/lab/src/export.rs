@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use chefshat_cli::data_dir::RecordsArg;
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, after_printing};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::progress;
 
@@ -113,19 +113,19 @@ impl Export {
                 problem: missing.problem.to_string(),
             }));
         let mut out = anstream::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", self.json_report(&exported))?;
-        } else {
-            self.write_report(&mut out, &exported)?;
-        }
+        let printed = match self.json {
+            true => writeln!(out, "{}", self.json_report(&exported)),
+            false => self.write_report(&mut out, &exported),
+        };
+        let mut code = ExitCode::SUCCESS;
         if exported.damaged > 0 && !self.skip_damaged {
             let damaged = counted(exported.damaged, "damaged file");
             anstream::eprintln!(
                 "{damaged} left out in whole or part; with --skip-damaged this is no failure"
             );
-            return Ok(ExitCode::FAILURE);
+            code = ExitCode::FAILURE;
         }
-        Ok(ExitCode::SUCCESS)
+        after_printing(printed, code)
     }
 
     /// The formats without duplicates.

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use chefshat_cli::data_dir::RecordsArg;
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, after_printing};
 use chefshat_cli::kind::{KindArg, kind_filter};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line};
@@ -82,19 +82,20 @@ impl RatingsCommand {
         let kind = kind_filter(self.kind);
         let board = leaderboard(&gathered.ratings, kind, self.min_games, usize::MAX);
         let mut out = anstream::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", as_json(&gathered, &board))?;
+        let printed = if self.json {
+            writeln!(out, "{}", as_json(&gathered, &board))
         } else if self.csv {
-            out.write_all(&board::as_csv(&board)?)?;
+            out.write_all(&board::as_csv(&board)?)
         } else {
-            write!(out, "{}", as_text(&gathered, &board))?;
-        }
+            write!(out, "{}", as_text(&gathered, &board))
+        };
+        let mut code = ExitCode::SUCCESS;
         if gathered.damaged > 0 && !self.skip_damaged {
             let damaged = counted(gathered.damaged, "damaged record");
             anstream::eprintln!("{damaged} left out; with --skip-damaged this is no failure");
-            return Ok(ExitCode::FAILURE);
+            code = ExitCode::FAILURE;
         }
-        Ok(ExitCode::SUCCESS)
+        after_printing(printed, code)
     }
 
     /// Reads all records on all cores, then rates the games in order.

@@ -90,12 +90,13 @@ impl Simulate {
         let records = self.records.as_deref();
         let written = records.map(|folder| pool.install(|| write_records(&batch, folder)));
         let mut out = anstream::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", report::json(&batch, &table))?;
-        } else {
-            write!(out, "{}", report::text(&batch, &table))?;
-        }
+        let printed = match self.json {
+            true => writeln!(out, "{}", report::json(&batch, &table)),
+            false => write!(out, "{}", report::text(&batch, &table)),
+        };
+        // A reader who has closed the output does not hide that records are missing.
         written.transpose()?;
+        printed?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -102,13 +102,14 @@ impl Simulate {
         let results = self.results(&tournament);
         let written = csv.map(|file| files::write_standings(file, &results));
         let mut out = anstream::stdout().lock();
-        if self.json {
-            writeln!(out, "{}", self.json(&rules, &tournament, &results))?;
-        } else {
-            write!(out, "{}", self.text(&rules, &tournament, &results))?;
-        }
-        out.flush()?;
+        let printed = match self.json {
+            true => writeln!(out, "{}", self.json(&rules, &tournament, &results)),
+            false => write!(out, "{}", self.text(&rules, &tournament, &results)),
+        };
+        let printed = printed.and_then(|()| out.flush());
+        // A reader who has closed the output does not hide that the file is missing.
         written.transpose()?;
+        printed?;
         Ok(ExitCode::SUCCESS)
     }
 

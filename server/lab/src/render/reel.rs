@@ -80,7 +80,9 @@ impl<'a> Reel<'a> {
         let shown = self.show(|picture, shown_for| {
             let times = shown_for.as_secs_f64() * f64::from(PICTURES_A_SECOND);
             for _ in 0..(times.round() as u64).max(1) {
-                ffmpeg.input.write_all(picture.data())?;
+                let written = ffmpeg.input.write_all(picture.data());
+                // Not the broken pipe of the output, after which a command ends well.
+                written.map_err(|error| format!("{}: {error}", program.display()))?;
             }
             Ok(())
         });

@@ -5,7 +5,7 @@ use std::iter;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::{chefshat, fixture, run, serve, until_recorded};
+use super::run::{chefshat, fixture, run, serve, typed_into_a_closed_pipe, until_recorded};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
 
@@ -102,6 +102,13 @@ fn a_damaged_record_is_named_and_the_others_are_rated() {
     for named in ["damaged.jsonl: ", "--skip-damaged"] {
         assert!(ended.stderr.contains(named), "{ended:?}");
     }
+    assert!(ended.stdout.contains("of 2 records"), "{ended:?}");
+    let unread = typed_into_a_closed_pipe(&format!("ratings {damaged} {fixtures}"));
+    assert_eq!(unread.code, Some(1), "{unread:?}");
+    let nowhere = folder.path().join("nowhere.jsonl");
+    let ended = chefshat(&["ratings", nowhere.to_str().unwrap(), fixtures]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert!(ended.stderr.contains("nowhere.jsonl: "), "{ended:?}");
     assert!(ended.stdout.contains("of 2 records"), "{ended:?}");
     let printed = chefshat(&["ratings", "--json", "--skip-damaged", damaged, fixtures]).well();
     assert!(

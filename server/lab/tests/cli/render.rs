@@ -191,12 +191,17 @@ fn ffmpeg_receives_every_frame() {
     assert_eq!(files_in(&folder), ["film.mp4"]);
 
     // A failure is reported with its message and leaves the file unchanged.
-    let program = fake_ffmpeg(tools.path(), "echo no such codec >&2; exit 3");
-    let ended = render(&out, &format!("{flags} --ffmpeg {program}"));
-    assert_eq!(ended.code, Some(1));
-    assert!(ended.stderr.contains("no such codec"), "{}", ended.stderr);
-    assert_eq!(std::fs::read_to_string(&out).unwrap(), written);
-    assert_eq!(files_in(&folder), ["film.mp4"]);
+    for (script, words) in [
+        ("echo no such codec >&2; exit 3", "no such codec"),
+        ("exec true", "stand-in: Broken pipe"),
+    ] {
+        let program = fake_ffmpeg(tools.path(), script);
+        let ended = render(&out, &format!("{flags} --ffmpeg {program}"));
+        assert_eq!(ended.code, Some(1));
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        assert_eq!(std::fs::read_to_string(&out).unwrap(), written);
+        assert_eq!(files_in(&folder), ["film.mp4"]);
+    }
 }
 
 #[cfg(unix)]

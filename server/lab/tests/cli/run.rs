@@ -178,13 +178,19 @@ pub(super) fn run(server: &str, line: &str) -> Ended {
     typed(&format!("{line} --server {server}"))
 }
 
-/// Runs a command line as on a full disk: it can write to no file.
-pub(super) fn typed_on_a_full_disk(line: &str) -> Ended {
+/// A command line as on a full disk: it can write to no file.
+pub(super) fn on_a_full_disk(line: &str) -> Command {
     let mut shell = without_settings(Command::new("sh"));
     // Without its signal, a write beyond the limit fails.
     let script = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
     shell.args(["-c", script, "sh", env!("CARGO_BIN_EXE_chefshat-lab")]);
-    Ended::of(shell.args(line.split_whitespace()).output().unwrap())
+    shell.args(line.split_whitespace());
+    shell
+}
+
+/// Runs a command line as on a full disk.
+pub(super) fn typed_on_a_full_disk(line: &str) -> Ended {
+    Ended::of(on_a_full_disk(line).output().unwrap())
 }
 
 /// A pipe that its reader has closed, as `head` does.

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, typed, typed_on_a_full_disk};
+use super::run::{Ended, closed_pipe, on_a_full_disk, typed, typed_on_a_full_disk};
 
 fn simulate(flags: &str) -> Ended {
     typed(&format!("simulate {flags}"))
@@ -157,9 +157,13 @@ fn records_that_cannot_be_written_cost_no_result() {
     refused.assert_failed("--records: ");
     let records = folder.path().join("records");
     let flags = "--games 2 --records";
-    let ended = typed_on_a_full_disk(&format!("simulate {flags} {}", records.display()));
+    let line = format!("simulate {flags} {}", records.display());
+    let ended = typed_on_a_full_disk(&line);
     assert_eq!(ended.code, Some(1), "{ended:?}");
     assert_eq!(ended.stdout, simulate("--games 2").stdout);
+    let mut unread = on_a_full_disk(&line);
+    let ended = Ended::of(unread.stdout(closed_pipe()).output().unwrap());
+    assert_eq!(ended.code, Some(1), "{ended:?}");
 }
 
 #[test]

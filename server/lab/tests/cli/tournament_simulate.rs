@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, typed, typed_on_a_full_disk};
+use super::run::{Ended, closed_pipe, on_a_full_disk, typed, typed_on_a_full_disk};
 
 fn simulate(flags: &str) -> Ended {
     typed(&format!("tournament simulate {flags}"))
@@ -135,6 +135,9 @@ fn a_file_that_cannot_be_written_costs_no_result() {
     let ended = typed_on_a_full_disk(&simulate_to("standings.csv"));
     assert_eq!(ended.code, Some(1), "{ended:?}");
     ended.assert_says(&["round robin of 4 participants"]);
+    let mut unread = on_a_full_disk(&simulate_to("standings.csv"));
+    let ended = Ended::of(unread.stdout(closed_pipe()).output().unwrap());
+    assert_eq!(ended.code, Some(1), "{ended:?}");
 }
 
 #[test]
