@@ -12,7 +12,7 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::jsonl;
-use chefshat_render::{Film, Frame, Painter, Perspective, When, figure_at};
+use chefshat_render::{Film, Frame, Painter, Perspective, When, figure_at, frame_at};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -252,15 +252,13 @@ impl Render {
                 painter.figure(&figure.map_err(|error| self.of_record(error))?)
             }
             (_, at) => {
-                let film =
-                    Film::new(lines, self.perspective()).map_err(|error| self.of_record(error))?;
                 let when = match (at, self.shift) {
                     (Some(At::Decision(decision)), _) => When::Decision(decision),
                     (_, Some(shift)) => When::ShiftEnd(shift),
                     _ => When::End,
                 };
-                let frame = film.at(when).map_err(|error| self.of_record(error))?;
-                painter.table(&frame.scene)
+                let frame = frame_at(lines, self.perspective(), when);
+                painter.table(&frame.map_err(|error| self.of_record(error))?.scene)
             }
         };
         let width = self.width.unwrap_or(PICTURE_WIDTH);

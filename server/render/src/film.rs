@@ -9,7 +9,6 @@ use chefshat_engine::{Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
 
 use super::figure::Figure;
-use super::scene::Scene;
 use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::{ReplayError, walk};
 use cut::{Cut, chronicle_of};
@@ -102,9 +101,12 @@ impl Film {
     /// # Errors
     /// The record does not verify, has no such seat, or ended before the first deal.
     pub fn new(lines: &[v1::RecordLine], perspective: Perspective) -> Result<Film, FilmError> {
-        let viewer = viewer(lines, perspective)?;
-        let mut cut = Cut::new(viewer);
+        let mut cut = Cut::new(viewer(lines, perspective)?);
         walk(lines, |moment| cut.take(&moment))?;
+        Self::of(cut)
+    }
+
+    fn of(cut: Cut) -> Result<Film, FilmError> {
         if cut.frames.is_empty() {
             return Err(FilmError::Empty);
         }
@@ -217,19 +219,30 @@ impl Film {
     }
 }
 
-/// The scene at the end of a game, without the rest of its film.
+/// The frame of a moment as [`Film::at`] finds it, without the rest of the film, which may be large.
 ///
 /// # Errors
-/// As [`Film::new`].
-pub fn last_scene(lines: &[v1::RecordLine], perspective: Perspective) -> Result<Scene, FilmError> {
+/// As [`Film::new`] and [`Film::at`].
+pub fn frame_at(
+    lines: &[v1::RecordLine],
+    perspective: Perspective,
+    when: When,
+) -> Result<Frame, FilmError> {
+    let is_reached = |frame: &Frame| match (frame.when, when) {
+        (When::Decision(decision), When::Decision(wanted)) => decision >= wanted,
+        (When::End, When::Decision(_)) => true,
+        (reached, wanted) => reached == wanted,
+    };
     let mut cut = Cut::new(viewer(lines, perspective)?);
     walk(lines, |moment| {
         cut.take(&moment);
-        let before = cut.frames.len().saturating_sub(1);
-        cut.frames.drain(..before);
+        // The frame before is that of a hidden decision.
+        match cut.frames.iter().any(is_reached) {
+            true => cut.frames.truncate(2),
+            false => drop(cut.frames.drain(..cut.frames.len().saturating_sub(1))),
+        }
     })?;
-    let last = cut.frames.pop().ok_or(FilmError::Empty)?;
-    Ok(last.scene)
+    Film::of(cut)?.at(when).cloned()
 }
 
 /// The action table of a decision.

@@ -17,7 +17,7 @@ mod table;
 pub use card::Card;
 pub use chronicle::{Chronicle, LogEntry, Participant, ParticipantKind, Presence};
 pub use figure::{Figure, State};
-pub use film::{Film, FilmError, Frame, Perspective, When, figure_at, last_scene};
+pub use film::{Film, FilmError, Frame, Perspective, When, figure_at, frame_at};
 pub use gif::{GifError, GifWriter, Palette};
 pub use paint::{MAX_WIDTH, MIN_WIDTH, PaintError, Painter, Pixels};
 pub use scene::{Hand, Now, Scene, SeatScene};

@@ -1,7 +1,7 @@
 //! The action table of a decision agrees with the mask and is only for the seat that decides.
 
 use chefshat_engine::{Action, ActionId, DecisionKind, Game, Requirement, Seed, Viewer};
-use chefshat_render::{Figure, FilmError, Perspective, State, figure_at};
+use chefshat_render::{Figure, Film, FilmError, Perspective, State, When, figure_at, frame_at};
 
 use super::{chronicle, fixture, rules};
 
@@ -86,6 +86,30 @@ fn check(game: &Game, figure: &Figure) {
         matches!(figure.requirement, Requirement::Play(_)),
         kind == DecisionKind::Turn
     );
+}
+
+#[test]
+fn a_frame_is_that_of_the_film() {
+    for name in ["fixed.jsonl", "committed.jsonl"] {
+        let lines = fixture(name);
+        for perspective in [
+            Perspective::All,
+            Perspective::Seat(1),
+            Perspective::Spectator,
+        ] {
+            let film = Film::new(&lines, perspective).unwrap();
+            let last = film.decisions();
+            let decisions = (1..=30)
+                .chain([last / 2, last, last + 1])
+                .map(When::Decision);
+            let ends = (0..=4).map(When::ShiftEnd).chain([When::End]);
+            for when in decisions.chain(ends) {
+                let frame = frame_at(&lines, perspective, when);
+                let expected = film.at(when).cloned();
+                assert_eq!(format!("{frame:?}"), format!("{expected:?}"), "{when:?}");
+            }
+        }
+    }
 }
 
 #[test]
