@@ -73,15 +73,19 @@ impl Pool {
         for task in tasks() {
             let most = self.task_deals.map_or(task.deals, |deals| deals as usize);
             let deals = most.min(task.deals);
+            let mut compared = None;
             for entrant in entrants {
                 if offline::check_fits(task, entrant).is_ok() {
-                    results.push(offline::result(task, entrant, deals)?);
+                    let result = offline::result(task, entrant, deals)?;
+                    // The file of a network may have its name.
+                    if entrant.given == VERSUS {
+                        compared = Some(result.clone());
+                    }
+                    results.push(result);
                 }
             }
-            let mut of_task = results.iter().rev().take(entrants.len());
-            let is_played = |it: &&TaskResult| it.task == task.name && it.agent.name == VERSUS;
-            versus.push(match of_task.find(is_played) {
-                Some(result) => result.clone(),
+            versus.push(match compared {
+                Some(result) => result,
                 None => offline::result(task, &Entrant::of(VERSUS)?, deals)?,
             });
         }

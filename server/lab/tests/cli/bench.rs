@@ -327,6 +327,19 @@ fn the_pool_has_a_row_and_a_column_for_each_agent() {
     ))
     .well();
     text.assert_table_fits(10);
+    // A file takes nobody's place by its name.
+    let folder = tempfile::tempdir().unwrap();
+    let network = folder.path().join("greedy.safetensors");
+    fs::copy(fixture("network/table-actions.safetensors"), &network).unwrap();
+    let flags = "--deals 2 --task-deals 2 --json";
+    let pool = format!("bench pool --agents random,{} {flags}", network.display());
+    let pool = typed(&pool).well().json();
+    let rows = pool["tasks"][0]["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    assert!(
+        rows.iter().all(|row| row["difference"].is_object()),
+        "{rows:?}"
+    );
 }
 
 #[test]
