@@ -81,12 +81,13 @@ impl Folder {
     }
 
     /// Opens the folder, or creates it. One that has games of something else, or to which another run
-    /// adds games, is refused.
+    /// adds games, is refused. An agent that connects may join with its name, so it keeps that.
     pub(super) fn create(
         path: &Path,
         task: &Task,
         agent: AgentInfo,
         command: String,
+        connects: bool,
     ) -> Result<Self, CommandError> {
         check_agent(path, &agent)?;
         let named = |error| format!("{}: {error}; name another with --out", path.display());
@@ -116,6 +117,13 @@ impl Folder {
                 return Err(format!(
                     "{} has games of the task {task}, played by {by}; name another folder with --out",
                     path.display()
+                )
+                .into());
+            }
+            if connects && earlier.agent.name != folder.manifest.agent.name {
+                let (path, name) = (path.display(), &earlier.agent.name);
+                return Err(format!(
+                    "{path} has games of {name:?}; give that with --name, or name another folder with --out"
                 )
                 .into());
             }

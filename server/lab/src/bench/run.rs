@@ -129,7 +129,7 @@ impl Run {
         let entrant = Entrant::of(agent)?;
         offline::check_fits(task, &entrant)?;
         let deals = self.deals()?;
-        let folder = self.folder(agent, &entrant.label, task)?;
+        let folder = self.folder(agent, Some(&entrant.label), task)?;
         let missing = folder.missing(deals);
         offline::play_all(&folder, &entrant, missing, &AtomicBool::new(false))?;
         Ok(folder)
@@ -143,7 +143,7 @@ impl Run {
     ) -> Result<Folder, CommandError> {
         let command = AgentCommand::for_games(self.command.clone())?;
         let deals = self.deals()?;
-        let folder = self.folder(&self.command.join(" "), "", task)?;
+        let folder = self.folder(&self.command.join(" "), None, task)?;
         let parallel = usize::from(self.parallel);
         let server = self.server.as_deref();
         let missing = folder.missing(deals);
@@ -154,13 +154,19 @@ impl Run {
         played.map(|()| folder)
     }
 
-    fn folder(&self, command: &str, label: &str, task: &Task) -> Result<Folder, CommandError> {
+    /// The folder of an agent that connects, or of one with this label that plays in this process.
+    fn folder(
+        &self,
+        command: &str,
+        label: Option<&str>,
+        task: &Task,
+    ) -> Result<Folder, CommandError> {
         let agent = AgentInfo {
-            name: self.name.clone().unwrap_or_else(|| label.to_owned()),
+            name: (self.name.clone()).unwrap_or_else(|| label.unwrap_or_default().to_owned()),
             description: self.description.clone(),
             url: self.url.clone(),
         };
-        let folder = Folder::create(&self.out, task, agent, command.to_owned())?;
+        let folder = Folder::create(&self.out, task, agent, command.to_owned(), label.is_none())?;
         let (played, missing) = (folder.played(), folder.missing(self.deals()?).len());
         if played > 0 {
             let (path, games) = (self.out.display(), counted(played as u64, "game"));

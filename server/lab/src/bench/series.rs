@@ -480,9 +480,10 @@ impl Listed {
             description: self.description,
             url: self.url,
         };
+        let connects = matches!(runner, Runner::Connected(_));
         Ok(Player {
             runner,
-            folder: Arc::new(Folder::create(&path, task, agent, command)?),
+            folder: Arc::new(Folder::create(&path, task, agent, command, connects)?),
             costs: Costs::default(),
             failures: 0,
             has_ended: false,

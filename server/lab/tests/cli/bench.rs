@@ -52,6 +52,8 @@ fn an_agent_has_the_same_result_wherever_it_plays() {
         "while read address code name; do {PROGRAM} agent greedy --server http://$address --code $code; done"
     );
     let one_process = run("game", &one, &["--name", "one", "--", "sh", "-c", &loops]);
+    let renamed = run("game", &one, &["--name", "One", "--", "sh", "-c", &loops]);
+    renamed.assert_failed("has games of \"one\"");
     assert_eq!(figures(&each_game), figures(&offline));
     assert_eq!(figures(&one_process), figures(&offline));
     assert_eq!(offline.json()["decision_ms"], Value::Null);
