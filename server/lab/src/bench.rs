@@ -117,6 +117,9 @@ impl Tasks {
     }
 }
 
+const TABLE_HELP: &str =
+    "Exit code 1: a result is left out of the table, and named, or there is none.";
+
 #[derive(Debug, Args)]
 struct Submit {
     /// The folder that `chefshat bench` wrote.
@@ -146,6 +149,7 @@ impl Submit {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = TABLE_HELP)]
 struct TableCommand {
     /// Folders that `chefshat bench` wrote, which are checked, or files with results, which are
     /// believed.
@@ -192,10 +196,14 @@ impl TableCommand {
                 }
             }
         }
-        if let (true, Some(error)) = (results.is_empty(), left_out) {
-            return Err(error);
+        match left_out {
+            Some(error) if results.is_empty() => return Err(error),
+            _ => report::print_table(&results, &versus, self.json)?,
         }
-        report::print_table(&results, &versus, self.json)
+        Ok(match left_out {
+            Some(_) => ExitCode::FAILURE,
+            None => ExitCode::SUCCESS,
+        })
     }
 
     /// The result with which those are compared that have the deals of `result`.

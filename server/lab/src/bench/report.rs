@@ -108,12 +108,12 @@ pub(super) fn print_table(
     results: &[TaskResult],
     versus: &[TaskResult],
     as_json: bool,
-) -> Result<ExitCode, CommandError> {
+) -> Result<(), CommandError> {
     match as_json {
         true => say(table_json(results, versus))?,
         false => anstream::print!("{}", table_text(results, versus)),
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// The results of a task with the same deals, the best first, and the one with which they are compared.

@@ -194,8 +194,12 @@ impl Series {
             return Err("no agent has two games".into());
         }
         let versus = offline::reference(task, &Entrant::of(report::VERSUS)?, &results)?;
-        let printed = report::print_table(&results, &[versus], self.json)?;
-        Ok(if failed { ExitCode::FAILURE } else { printed })
+        report::print_table(&results, &[versus], self.json)?;
+        Ok(if failed {
+            ExitCode::FAILURE
+        } else {
+            ExitCode::SUCCESS
+        })
     }
 }
 

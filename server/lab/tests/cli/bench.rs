@@ -143,9 +143,8 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
         result.display()
     ));
     assert!(table.stderr.contains("left out: nowhere"), "{table:?}");
-    table
-        .well()
-        .assert_says(&["not checked", "2 of 2500 deals"]);
+    assert_eq!(table.code, Some(1));
+    table.assert_says(&["not checked", "2 of 2500 deals"]);
     assert_eq!(submitted["by_deal"][1], Value::Null);
     assert_eq!(submitted["by_deal"][3], whole.json()["by_deal"][3]);
 }
@@ -214,7 +213,8 @@ fn hidden_deals_are_played_and_checked_with_their_key_alone() {
     assert_eq!(figures(&checked), figures(&offline));
 
     let folders = format!("{} {}", path("greedy"), path("connected"));
-    let left_out = typed(&format!("bench table {folders} {}", path("published"))).well();
+    let left_out = typed(&format!("bench table {folders} {}", path("published")));
+    assert_eq!(left_out.code, Some(1));
     assert!(left_out.stderr.contains("has hidden deals"), "{left_out:?}");
     let all = typed(&format!(
         "bench table {folders} {} --deals-key {deals}",
@@ -355,8 +355,8 @@ fn a_result_with_which_nothing_can_be_compared_leaves_the_others_in_the_table() 
     let table = typed(&format!(
         "bench table {folders} --versus {}",
         network.display()
-    ))
-    .well();
+    ));
+    assert_eq!(table.code, Some(1));
     assert!(table.stderr.contains("left out: small_deck: "), "{table:?}");
     table.assert_says(&["ChefsHat-v1 shift"]);
     assert!(!table.stdout.contains("small_deck"), "{}", table.stdout);
