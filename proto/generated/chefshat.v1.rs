@@ -4140,7 +4140,7 @@ pub mod record_line {
     pub enum Line {
         /// The first line.
         #[prost(message, tag = "1")]
-        Header(super::RecordHeader),
+        Header(::prost::alloc::boxed::Box<super::RecordHeader>),
         /// A decision. Its events follow it.
         #[prost(message, tag = "2")]
         Decision(super::DecisionRecord),

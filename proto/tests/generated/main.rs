@@ -140,6 +140,7 @@ fn messages(out: &Path, descriptors: FileDescriptorSet) -> Generated {
         .boxed(".chefshat.v1.GameEvent.kind.hand_reported")
         .boxed(".chefshat.v1.GameEvent.kind.violation")
         .boxed(".chefshat.v1.GameEvent.kind.correction")
+        .boxed(".chefshat.v1.RecordLine.line.header")
         .boxed(".chefshat.v1.SeatUpdate.update.snapshot")
         // Columns are sent and viewed as they are, without copies.
         .bytes(".chefshat.v1.VectorActions")

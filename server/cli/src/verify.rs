@@ -53,7 +53,7 @@ pub(super) struct Verify {
 
 /// A correct record.
 struct Fits {
-    header: v1::RecordHeader,
+    header: Box<v1::RecordHeader>,
     replayed: Replayed,
 }
 

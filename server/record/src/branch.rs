@@ -174,7 +174,7 @@ struct FirstDeal {
 impl Collector {
     fn visit(&mut self, moment: &Moment<'_>, point: u64) {
         match moment.entry {
-            Line::Header(header) => self.header = header.clone(),
+            Line::Header(header) => self.header = (**header).clone(),
             Line::Decision(decision) => {
                 if self.decisions == point {
                     self.at_point = moment.game.cloned();

@@ -64,12 +64,15 @@ pub enum LineProblem {
     /// The line exceeds [`MAX_LINE_BYTES`].
     #[error("is longer than {MAX_LINE_BYTES} bytes, the most a line may have")]
     TooLong,
-    /// The file exceeds [`MAX_LINES`].
-    #[error("is one too many: a record has at most {MAX_LINES} lines")]
-    TooMany,
+    /// The file exceeds [`MAX_LINES`], or what its reader allows.
+    #[error("is one too many: this record may have at most {0} lines")]
+    TooMany(usize),
     /// The file exceeds [`MAX_RECORD_BYTES`].
     #[error("exceeds the {MAX_RECORD_BYTES} bytes a record may have")]
     TooLarge,
+    /// The line has nothing.
+    #[error("is empty")]
+    Nothing,
     /// A list exceeds its bound.
     #[error("has more than {most} entries in `{field}`")]
     LongList {
@@ -232,8 +235,16 @@ pub fn read(path: &Path) -> Result<Vec<RecordLine>, RecordFileError> {
 /// # Errors
 /// See [`read`].
 pub fn read_record(path: &Path) -> Result<Record, RecordFileError> {
+    read_record_of(path, MAX_LINES)
+}
+
+/// As [`read_record`], for a record of at most this many lines, each of which takes memory.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_record_of(path: &Path, most_lines: usize) -> Result<Record, RecordFileError> {
     let file = File::open(path).map_err(|source| io_error(path, source))?;
-    read_text(path, BufReader::new(file))
+    read_within(path, BufReader::new(file), most_lines)
 }
 
 /// Reads a record from anything that has its text. `path` names it in errors.
@@ -241,8 +252,16 @@ pub fn read_record(path: &Path) -> Result<Record, RecordFileError> {
 /// # Errors
 /// See [`read`].
 pub fn read_text(path: &Path, text: impl BufRead) -> Result<Record, RecordFileError> {
+    read_within(path, text, MAX_LINES)
+}
+
+fn read_within(
+    path: &Path,
+    text: impl BufRead,
+    most_lines: usize,
+) -> Result<Record, RecordFileError> {
     let mut record = Record::default();
-    match read_lines(text, MAX_RECORD_BYTES, &mut record) {
+    match read_lines(text, MAX_RECORD_BYTES, most_lines, &mut record) {
         Ok(()) => Ok(record),
         Err(Stopped::Io(source)) => Err(io_error(path, source)),
         Err(Stopped::Line(problem)) => Err(RecordFileError::Line {
@@ -267,8 +286,13 @@ impl From<LineProblem> for Stopped {
     }
 }
 
-/// Reads a record of at most `most_bytes`.
-fn read_lines(mut file: impl BufRead, most_bytes: u64, record: &mut Record) -> Result<(), Stopped> {
+/// Reads a record of at most `most_bytes` and `most_lines`.
+fn read_lines(
+    mut file: impl BufRead,
+    most_bytes: u64,
+    most_lines: usize,
+    record: &mut Record,
+) -> Result<(), Stopped> {
     let Record { lines, text } = record;
     let most_of_line = u64::try_from(MAX_LINE_BYTES).expect("a fraction of a mebibyte") + 1;
     let (mut bytes, mut all_bytes) = (Vec::new(), 0u64);
@@ -285,8 +309,8 @@ fn read_lines(mut file: impl BufRead, most_bytes: u64, record: &mut Record) -> R
         if bytes.len() > MAX_LINE_BYTES {
             return Err(LineProblem::TooLong.into());
         }
-        if lines.len() >= MAX_LINES {
-            return Err(LineProblem::TooMany.into());
+        if lines.len() >= most_lines {
+            return Err(LineProblem::TooMany(most_lines).into());
         }
         if all_bytes > most_bytes {
             return Err(LineProblem::TooLarge.into());
@@ -309,9 +333,7 @@ fn read_lines(mut file: impl BufRead, most_bytes: u64, record: &mut Record) -> R
 /// Checks the bounds that keep a small file from becoming large in memory; the replay checks the
 /// rest.
 fn check(line: &RecordLine, is_first: bool) -> Result<(), LineProblem> {
-    let Some(line) = &line.line else {
-        return Ok(());
-    };
+    let line = line.line.as_ref().ok_or(LineProblem::Nothing)?;
     if !is_first && matches!(line, Line::Header(_)) {
         return Err(LineProblem::SecondHeader);
     }
@@ -349,7 +371,7 @@ mod tests {
         let size = u64::try_from(text.len()).expect("a few bytes");
         let read = |most| {
             let mut record = Record::default();
-            let read = read_lines(text.as_bytes(), most, &mut record);
+            let read = read_lines(text.as_bytes(), most, MAX_LINES, &mut record);
             (record.lines.len(), read)
         };
         assert!(matches!(read(size), (3, Ok(()))));
@@ -362,8 +384,25 @@ mod tests {
     }
 
     #[test]
-    fn the_most_empty_lines_take_less_than_two_gibibytes() {
-        // Empty lines take the most memory per byte of the file.
-        assert!(size_of::<RecordLine>() * MAX_LINES < 2 * 1024 * 1024 * 1024);
+    fn a_small_file_takes_little_memory() {
+        // The shortest lines take the most memory per byte of the file.
+        assert!(size_of::<RecordLine>() <= 200);
+        let read = |text: &str, most| {
+            let mut record = Record::default();
+            let read = read_lines(text.as_bytes(), MAX_RECORD_BYTES, most, &mut record);
+            (record.lines.len(), read)
+        };
+        assert!(matches!(
+            read("{}\n", MAX_LINES),
+            (0, Err(Stopped::Line(LineProblem::Nothing)))
+        ));
+        let text = "{\"event\":{}}\n".repeat(3);
+        assert!(matches!(read(&text, 3), (3, Ok(()))));
+        let (lines, too_many) = read(&text, 2);
+        assert_eq!(lines, 2);
+        assert!(matches!(
+            too_many,
+            Err(Stopped::Line(LineProblem::TooMany(2)))
+        ));
     }
 }

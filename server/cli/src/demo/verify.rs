@@ -219,11 +219,11 @@ mod tests {
             })
         };
         let record = [
-            Line::Header(v1::RecordHeader {
+            Line::Header(Box::new(v1::RecordHeader {
                 game_id: hex::encode(ID),
                 rules: Some(rules_to_proto(&rules)),
                 ..v1::RecordHeader::default()
-            }),
+            })),
             event(Kind::ShiftStarted(v1::ShiftStarted {
                 shift: 1,
                 hands: game.hands.clone(),

@@ -376,10 +376,10 @@ mod tests {
     #[test]
     fn a_record_is_sent_whole_and_in_parts_that_fit() {
         let line = |bytes: usize| RecordLine {
-            line: Some(Line::Header(v1::RecordHeader {
+            line: Some(Line::Header(Box::new(v1::RecordHeader {
                 room_name: "x".repeat(bytes),
                 ..v1::RecordHeader::default()
-            })),
+            }))),
         };
         let lines: Vec<RecordLine> = [10, 31_000, 900, 20_000, 40_000, 5, 5].map(line).into();
         let parts = in_parts(lines.clone());

@@ -622,10 +622,10 @@ mod tests {
 
     fn header(game: u8) -> v1::RecordLine {
         v1::RecordLine {
-            line: Some(Line::Header(v1::RecordHeader {
+            line: Some(Line::Header(Box::new(v1::RecordHeader {
                 game_id: GameId::from_bytes([game; 16]).to_string(),
                 ..v1::RecordHeader::default()
-            })),
+            }))),
         }
     }
 

@@ -411,7 +411,7 @@ mod tests {
             _ => v1::RoomState::Aborted,
         });
         [
-            Line::Header(header),
+            Line::Header(Box::new(header)),
             Line::Event(event),
             Line::Footer(footer),
         ]

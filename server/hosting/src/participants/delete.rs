@@ -221,7 +221,7 @@ fn remove_samples(record: &Candidate, lines: &[v1::RecordLine], who: &Named) -> 
 
 fn header_of(lines: &[v1::RecordLine]) -> Option<&v1::RecordHeader> {
     lines.iter().find_map(|line| match &line.line {
-        Some(Line::Header(header)) => Some(header),
+        Some(Line::Header(header)) => Some(&**header),
         _ => None,
     })
 }
@@ -290,7 +290,7 @@ mod tests {
                 seats: vec![seat("Ana", "random"), seat(names[1], "")],
                 ..v1::RecordHeader::default()
             };
-            let mut lines = vec![line(Line::Header(header))];
+            let mut lines = vec![line(Line::Header(Box::new(header)))];
             lines.extend(names.iter().map(seated));
             lines
         };

@@ -21,6 +21,9 @@ const RESULT: &str = "result.json";
 /// Bytes of the longest record that is read: a Shift has 30,000, a game of ten thousand turns a few
 /// millions.
 const MAX_RECORD: u64 = 64 << 20;
+/// Lines of the longest record that is read: a game of ten thousand turns has 25,000. Those of all deals
+/// are in memory on as many cores as there are.
+const MAX_LINES: usize = 100_000;
 /// Bytes of the longest other file.
 const MAX_JSON: u64 = 4 << 20;
 /// What is wrong with a result that is read from a file.
@@ -164,7 +167,7 @@ impl Folder {
             let path = path.display();
             return Err(format!("{path}: no game of a task has such a record").into());
         }
-        let record = jsonl::read_record(&path)?;
+        let record = jsonl::read_record_of(&path, MAX_LINES)?;
         let score = check(&self.task, deal, &record);
         Ok(Some(score.map_err(|problem| {
             format!("{}: {problem}", path.display())

@@ -117,6 +117,10 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     );
     fs::copy(record(0), record(1)).unwrap();
     fs::write(record(2), "no record").unwrap();
+    let markers = "{\"marker\":{}}\n".repeat(200_000);
+    let header = fs::read_to_string(record(3)).unwrap();
+    let header = header.split_inclusive('\n').next().unwrap();
+    fs::write(record(4), format!("{header}{markers}")).unwrap();
     let submitted = typed(&format!("bench submit {} --json", folder.display())).json();
     assert_eq!(submitted["deals"], 2);
     let problems = submitted["problems"].to_string();
@@ -124,6 +128,7 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
         "2 of 2500 deals",
         "0001.jsonl: the game has a different seed",
         "0002.jsonl",
+        "0004.jsonl: line 100001 is one too many",
     ] {
         assert!(problems.contains(expected), "{problems}");
     }

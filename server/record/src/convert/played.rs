@@ -185,7 +185,7 @@ impl Lines {
             lines: Vec::new(),
             events: 0,
         };
-        lines.line(Line::Header(header));
+        lines.line(Line::Header(Box::new(header)));
         for seated in clients {
             lines.event(Kind::Seated(Box::new(seated)), Vec::new());
         }

@@ -137,7 +137,7 @@ impl Importer {
     }
 
     fn run(mut self, transcript: &Transcript) -> Result<Vec<v1::RecordLine>, TranscriptError> {
-        self.push(Line::Header(self.header.clone()));
+        self.push(Line::Header(Box::new(self.header.clone())));
         for seat in self.header.seats.clone() {
             self.room_event(Kind::Seated(Box::new(v1::Seated {
                 seat: seat.seat,

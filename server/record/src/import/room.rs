@@ -61,7 +61,7 @@ impl PhysicalRoom {
         };
         let header = self.header.clone();
         let mut importer = Importer::new(self.rules, self.header, start, self.shifts);
-        importer.push(Line::Header(header));
+        importer.push(Line::Header(Box::new(header)));
         for entry in self.entries {
             importer.entry(entry)?;
         }

@@ -49,7 +49,7 @@ impl TestGame<'_> {
     /// Plays the game. `source` gives the source of each decision by its index in the game.
     pub fn record(&self, source: impl Fn(u64) -> v1::DecisionSource) -> Vec<v1::RecordLine> {
         let mut lines = Lines {
-            lines: vec![Line::Header(self.header())],
+            lines: vec![Line::Header(Box::new(self.header()))],
             events: 0,
             elapsed_ms: 0,
         };

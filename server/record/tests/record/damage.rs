@@ -197,7 +197,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("lines swapped", Swap(8, 9), 8, "`play` follows from no decision"),
         ("the footer in the middle", Swap(20, 493), 20, "the game is not over"),
         ("more behind the footer", Append(r#"{"footer":{}}"#), 494, "continues after its footer"),
-        ("an empty line", Bytes(30, b"{}".to_vec()), 30, "the line is empty"),
+        ("an empty line", Bytes(30, b"{}".to_vec()), 30, "is empty"),
         // The file.
         ("cut behind a line", CutBehind(300), 301, "it ends before the game does"),
         ("no footer", CutBehind(492), 493, "it ends before its footer"),

@@ -474,7 +474,7 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
         })))
     };
     let lines = vec![
-        Line::Header(header),
+        Line::Header(Box::new(header)),
         // One of the name leaves before the game: the record does not say which.
         seated(0),
         event(Kind::Vacated(v1::Vacated { seat: 0 })),

@@ -531,10 +531,10 @@ async fn an_imported_game_is_stored_once() {
     let header = header(1, Durability::Durable);
     let lines: Arc<[v1::RecordLine]> = Arc::from([
         v1::RecordLine {
-            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+            line: Some(v1::record_line::Line::Header(Box::new(v1::RecordHeader {
                 game_id: header.game_id.to_string(),
                 ..v1::RecordHeader::default()
-            })),
+            }))),
         },
         v1::RecordLine {
             line: Some(v1::record_line::Line::Footer(v1::RecordFooter::default())),

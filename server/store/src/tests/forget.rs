@@ -405,10 +405,10 @@ async fn an_imported_record_is_changed_too() {
     with_each_store(async |store| {
         let header = header(1, Durability::Durable);
         let record: Arc<[v1::RecordLine]> = Arc::from([v1::RecordLine {
-            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+            line: Some(v1::record_line::Line::Header(Box::new(v1::RecordHeader {
                 seats: summary_of(&header).seats,
                 ..v1::RecordHeader::default()
-            })),
+            }))),
         }]);
         let imported = store.import(header.game_id, *summary_of(&header), record);
         assert_eq!(imported.await, Ok(true));

@@ -180,7 +180,7 @@ impl Room {
             decisions: 0,
             ..v1::RecordFooter::default()
         };
-        std::iter::once(Line::Header(record_header(&self.core)))
+        std::iter::once(Line::Header(Box::new(record_header(&self.core))))
             .chain(events)
             .chain(std::iter::once(Line::Footer(footer)))
             .map(|line| v1::RecordLine { line: Some(line) })

@@ -45,7 +45,7 @@ pub fn each_record_line(
     // The first line says how the game ended.
     let mut ended = Core::new(without_labels(header));
     journal.iter().for_each(|entry| ended.refold(entry));
-    take(Line::Header(record_header(&ended)));
+    take(Line::Header(Box::new(record_header(&ended))));
     drop(ended);
     let mut core = Core::new(without_labels(header));
     let mut attempts: Vec<u32> = Vec::new();

@@ -813,10 +813,10 @@ mod tests {
             })
         };
         let lines = [
-            Line::Header(v1::RecordHeader {
+            Line::Header(Box::new(v1::RecordHeader {
                 created_at_ms: 5_000,
                 ..v1::RecordHeader::default()
-            }),
+            })),
             event(400, EventKind::GameStarted(Box::default())),
             decision(1, 2),
             decision(0, 1),
