@@ -9101,18 +9101,19 @@ pub struct StudySettings {
     /// nobody has the slot.
     #[prost(uint64, tag = "13")]
     pub drop_out_after_ms: u64,
-    /// Milliseconds since the Unix epoch when the study closes, before the year 10000; 0: when its owner
-    /// closes it.
+    /// Milliseconds since the Unix epoch from when nobody may begin, before the year 10000; 0: when its
+    /// owner closes it. The study is closed once this time has passed for ten minutes, so that a wrong
+    /// clock closes nothing.
     #[prost(uint64, tag = "14")]
     pub closes_at_ms: u64,
     /// How people without a link of their own take part; by default nobody does.
     #[prost(message, optional, tag = "15")]
     pub recruiting: ::core::option::Option<StudyRecruiting>,
-    /// Milliseconds since the Unix epoch when the study closes, if it is not closed. The server deletes
-    /// it with all its data, as DeleteStudy with `force`, one to two hours later: it checks for an hour
-    /// that this time has passed, so that a wrong clock deletes nothing. In the future when the study is
-    /// created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes it.
-    /// Participants are told this date with what they consent to.
+    /// Milliseconds since the Unix epoch when the study closes, as at `closes_at_ms`, if it is not
+    /// closed. The server deletes it with all its data, as DeleteStudy with `force`, one to two hours
+    /// later: it checks for an hour that this time has passed, so that a wrong clock deletes nothing. In
+    /// the future when the study is created, before the year 10000, and not before `closes_at_ms`; 0:
+    /// when its owner deletes it. Participants are told this date with what they consent to.
     #[prost(uint64, tag = "16")]
     pub deletes_at_ms: u64,
     /// Participants who play together; unset: everybody plays its own games.
@@ -14742,9 +14743,10 @@ pub mod tournament_service_client {
                 );
             self.inner.unary(req, path, codec).await
         }
-        /// Returns all who have played a rated game on this server, best first. A game is rated if it
-        /// finished, was public, was dealt by this server from its own seed, and different participants
-        /// played all seats without substitutes and without hints. Participants choose their names; a key
+        /// Returns all who have played a rated game on this server, best first. A game is rated if it was
+        /// public, was dealt by this server from its own seed, had a different participant on every seat,
+        /// and was finished, or broken off by a participant. A participant for whom a substitute played, who
+        /// was given a hint, or who broke the game off has lost it. Participants choose their names; a key
         /// (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
         /// INVALID_ARGUMENT (KIND_REFUSED).
         pub async fn get_leaderboard(
@@ -15001,9 +15003,10 @@ pub mod tournament_service_server {
             tonic::Response<super::ListTournamentGamesResponse>,
             tonic::Status,
         >> + std::marker::Send;
-        /// Returns all who have played a rated game on this server, best first. A game is rated if it
-        /// finished, was public, was dealt by this server from its own seed, and different participants
-        /// played all seats without substitutes and without hints. Participants choose their names; a key
+        /// Returns all who have played a rated game on this server, best first. A game is rated if it was
+        /// public, was dealt by this server from its own seed, had a different participant on every seat,
+        /// and was finished, or broken off by a participant. A participant for whom a substitute played, who
+        /// was given a hint, or who broke the game off has lost it. Participants choose their names; a key
         /// (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
         /// INVALID_ARGUMENT (KIND_REFUSED).
         fn get_leaderboard(

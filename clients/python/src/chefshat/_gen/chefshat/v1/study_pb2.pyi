@@ -1278,15 +1278,16 @@ class StudySettings(_message.Message):
     nobody has the slot.
     """
     closes_at_ms: _builtins.int
-    """Milliseconds since the Unix epoch when the study closes, before the year 10000; 0: when its owner
-    closes it.
+    """Milliseconds since the Unix epoch from when nobody may begin, before the year 10000; 0: when its
+    owner closes it. The study is closed once this time has passed for ten minutes, so that a wrong
+    clock closes nothing.
     """
     deletes_at_ms: _builtins.int
-    """Milliseconds since the Unix epoch when the study closes, if it is not closed. The server deletes
-    it with all its data, as DeleteStudy with `force`, one to two hours later: it checks for an hour
-    that this time has passed, so that a wrong clock deletes nothing. In the future when the study is
-    created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes it.
-    Participants are told this date with what they consent to.
+    """Milliseconds since the Unix epoch when the study closes, as at `closes_at_ms`, if it is not
+    closed. The server deletes it with all its data, as DeleteStudy with `force`, one to two hours
+    later: it checks for an hour that this time has passed, so that a wrong clock deletes nothing. In
+    the future when the study is created, before the year 10000, and not before `closes_at_ms`; 0:
+    when its owner deletes it. Participants are told this date with what they consent to.
     """
     @_builtins.property
     def factors(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyFactor]:

@@ -335,9 +335,10 @@ class TournamentServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def GetLeaderboard(self, request, context):
-        """Returns all who have played a rated game on this server, best first. A game is rated if it
-        finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes and without hints. Participants choose their names; a key
+        """Returns all who have played a rated game on this server, best first. A game is rated if it was
+        public, was dealt by this server from its own seed, had a different participant on every seat,
+        and was finished, or broken off by a participant. A participant for whom a substitute played, who
+        was given a hint, or who broke the game off has lost it. Participants choose their names; a key
         (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
         INVALID_ARGUMENT (KIND_REFUSED).
         """

@@ -155,9 +155,10 @@ class TournamentServiceStub:
     (PAGE_TOKEN_REFUSED).
     """
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
-    """Returns all who have played a rated game on this server, best first. A game is rated if it
-    finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes and without hints. Participants choose their names; a key
+    """Returns all who have played a rated game on this server, best first. A game is rated if it was
+    public, was dealt by this server from its own seed, had a different participant on every seat,
+    and was finished, or broken off by a participant. A participant for whom a substitute played, who
+    was given a hint, or who broke the game off has lost it. Participants choose their names; a key
     (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
     INVALID_ARGUMENT (KIND_REFUSED).
     """
@@ -289,9 +290,10 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     (PAGE_TOKEN_REFUSED).
     """
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
-    """Returns all who have played a rated game on this server, best first. A game is rated if it
-    finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes and without hints. Participants choose their names; a key
+    """Returns all who have played a rated game on this server, best first. A game is rated if it was
+    public, was dealt by this server from its own seed, had a different participant on every seat,
+    and was finished, or broken off by a participant. A participant for whom a substitute played, who
+    was given a hint, or who broke the game off has lost it. Participants choose their names; a key
     (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
     INVALID_ARGUMENT (KIND_REFUSED).
     """
@@ -534,9 +536,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.GetLeaderboardRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
-        """Returns all who have played a rated game on this server, best first. A game is rated if it
-        finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes and without hints. Participants choose their names; a key
+        """Returns all who have played a rated game on this server, best first. A game is rated if it was
+        public, was dealt by this server from its own seed, had a different participant on every seat,
+        and was finished, or broken off by a participant. A participant for whom a substitute played, who
+        was given a hint, or who broke the game off has lost it. Participants choose their names; a key
         (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
         INVALID_ARGUMENT (KIND_REFUSED).
         """
