@@ -65,10 +65,16 @@ impl Import {
             )
             .into());
         }
-        match signature::check(&lines, None) {
-            // Only the text of the file shows what an older version signed, if anything does.
-            Ok(Signed::Uncheckable(_)) => jsonl::copy(&self.file, &path)?,
-            _ => jsonl::write(&path, &lines)?,
+        // Only the text of the file shows what an older version signed, if anything does.
+        let copies = matches!(signature::check(&lines, None), Ok(Signed::Uncheckable(_)));
+        match (self.out.is_some(), copies) {
+            (true, true) => jsonl::copy(&self.file, &path)?,
+            (true, false) => jsonl::write(&path, &lines)?,
+            (false, true) => jsonl::copy_private(&self.file, &path)?,
+            (false, false) => jsonl::write_private(&path, |write| {
+                lines.iter().for_each(write);
+                Ok(())
+            })?,
         }
         self.print(&path, header, &replayed)?;
         Ok(ExitCode::SUCCESS)

@@ -144,7 +144,21 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), RecordFileError> {
     if let Some(folder) = to.parent() {
         std::fs::create_dir_all(folder).map_err(|source| io_error(to, source))?;
     }
-    let mut file = AtomicFile::create(to)?;
+    copy_to(AtomicFile::create(to)?, from)
+}
+
+/// [`copy`] into a data directory, as [`write_private`].
+///
+/// # Errors
+/// As [`copy`].
+pub fn copy_private(from: &Path, to: &Path) -> Result<(), RecordFileError> {
+    if let Some(folder) = to.parent() {
+        private::create_folder(folder).map_err(|source| io_error(to, source))?;
+    }
+    copy_to(AtomicFile::create_private(to)?, from)
+}
+
+fn copy_to(mut file: AtomicFile, from: &Path) -> Result<(), RecordFileError> {
     let text = File::open(from).and_then(|mut text| io::copy(&mut text, &mut file));
     text.map_err(|source| io_error(from, source))?;
     Ok(file.finish()?)

@@ -198,7 +198,11 @@ fn redact(
     if stored.is_none() && redactions == Redactions::default() {
         return Ok(None);
     }
-    let written = jsonl::write(&candidate.path, &stored.unwrap_or(lines));
+    let lines = stored.unwrap_or(lines);
+    let written = jsonl::write_private(&candidate.path, |write| {
+        lines.iter().for_each(write);
+        Ok(())
+    });
     written
         .map(|()| Some(redactions))
         .map_err(|error| error.to_string())

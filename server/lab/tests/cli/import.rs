@@ -55,6 +55,14 @@ fn a_transcript_becomes_a_record_that_verifies() {
         )
     );
 
+    // As the records that a server writes.
+    #[cfg(unix)]
+    for (path, mode) in [(path.as_path(), 0o600), (path.parent().unwrap(), 0o700)] {
+        use std::os::unix::fs::PermissionsExt as _;
+        let permissions = std::fs::metadata(path).unwrap().permissions();
+        assert_eq!(permissions.mode() & 0o777, mode, "{path:?}");
+    }
+
     let ended = chefshat(&["verify", flags[0], flags[1]]).well();
     assert!(
         ended
