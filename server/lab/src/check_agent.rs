@@ -104,7 +104,13 @@ impl CheckAgent {
         let examination = Examination::new(self.listen, patience, self.logs.clone()).await?;
         let mut passed = 0;
         let mut played = 0;
+        // Whether an agent has come: to rooms, and to tournaments, which may have another command.
+        let mut has_come: [Option<bool>; 2] = [None; 2];
         for case in &cases {
+            let has_come = &mut has_come[usize::from(case.is_tournament())];
+            if *has_come == Some(false) {
+                continue;
+            }
             let waiting = |waiting: &Waiting| self.print_waiting(case, waiting);
             let command = match case.is_tournament() {
                 true => in_tournaments.as_ref(),
@@ -114,9 +120,9 @@ impl CheckAgent {
             self.print(case, &outcome)?;
             played += 1;
             passed += usize::from(outcome.is_passed());
-            if outcome.is_fatal() {
-                break;
-            }
+            // A command that has worked before may work again. A person who has left may not come back.
+            let before = has_come.is_some() && command.is_some();
+            *has_come = Some(before || !outcome.is_fatal());
         }
         examination.stop().await?;
         self.print_summary(passed, played, cases.len())?;

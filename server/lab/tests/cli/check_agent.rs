@@ -5,6 +5,8 @@ use serde_json::Value;
 
 use super::run::{chefshat, typed};
 
+const PROGRAM: &str = env!("CARGO_BIN_EXE_chefshat-lab");
+
 #[test]
 fn the_cases_are_listed() {
     let listed = typed("check-agent --list").well();
@@ -37,6 +39,28 @@ fn a_report_has_the_expectation_the_fault_and_the_advice() {
     ] {
         ended.assert_says(&[part]);
     }
+}
+
+#[test]
+fn an_agent_that_once_does_not_join_is_examined_in_the_other_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    let script = format!(
+        "echo >> {0}; [ $(wc -l < {0}) = 2 ] || exec {PROGRAM} agent greedy --server http://$0 --code $1",
+        runs.display()
+    );
+    let agent = ["sh", "-c", &script, "{address}", "{code}"];
+    let arguments = "check-agent --json --only game --only small --only original --";
+    let arguments: Vec<&str> = arguments.split_whitespace().collect();
+    let ended = chefshat(&[&arguments[..], &agent[..]].concat());
+    assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+    let lines = ended.json_lines();
+    let summary = lines.iter().find(|line| line["event"] == "summary");
+    let summary = summary.expect("it is printed");
+    assert_eq!(
+        (&summary["played"], &summary["passed"]),
+        (&3.into(), &2.into())
+    );
 }
 
 #[test]
