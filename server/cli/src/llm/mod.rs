@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::{AgentKind, NamedAgent};
-use chefshat_client::v1::{self, seat_update::Update};
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
 use chefshat_engine::limits::{MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME};
 use chefshat_record::language_model::{
@@ -244,6 +244,7 @@ impl LlmArgs {
             usage: Some(Usage::default()),
             answers: Vec::new(),
             answered: None,
+            is_own: None,
             silent: 0,
             said: v1::Annotations::default(),
             annotated: 0,
@@ -295,6 +296,9 @@ pub(crate) struct LanguageModel {
     /// The decision that was answered last, while the server may refuse the answer: with that answer,
     /// and those before it that could not be used with what was said about them.
     answered: Option<(u64, Vec<Message>)>,
+    /// Whether the decision that was requested last is the model's, if it had a choice; `None` once it
+    /// is known who took it.
+    is_own: Option<bool>,
     /// Decisions in a row without a usable answer.
     silent: u32,
     /// To be recorded with the last decision.
@@ -320,7 +324,7 @@ impl LanguageModel {
             .map(|price| price.of(usage))
     }
 
-    /// Whether the fallback has taken so few decisions of the last game that it is the model's.
+    /// Whether the fallback and the server have taken so few decisions of the last game that it is the model's.
     pub(crate) fn has_played(&self) -> bool {
         self.spent.fallbacks as f64 <= self.max_fallbacks * self.spent.decisions as f64
     }
@@ -472,6 +476,7 @@ impl LanguageModel {
     /// The action of the fallback, if there is one, with why it decides.
     fn fall_back(&mut self, request: &v1::DecisionRequest, why: &str) -> Option<ActionId> {
         self.spent.fallbacks += 1;
+        self.is_own = Some(false);
         let decision = request.decision_id;
         let Fallback::Agent(kind) = self.fallback else {
             warn!(decision, why, "the decision is left to the server");
@@ -485,6 +490,35 @@ impl LanguageModel {
         let words = format!("{name}: {why}");
         self.say(FALLBACK, language::reason(&words).unwrap_or_default());
         Some(self.at_once.decide(request))
+    }
+
+    /// Counts a decision of this seat that the server has taken, or a substitute. Nobody knows whether one
+    /// that was not requested had a choice.
+    fn lost(&mut self) {
+        let is_own = self.is_own.take();
+        self.spent.decisions += u64::from(is_own.is_none());
+        self.spent.fallbacks += u64::from(is_own != Some(false));
+    }
+
+    /// Notes who took a decision of this seat.
+    fn note_source(&mut self, kind: &Kind) {
+        let (seat, source) = match kind {
+            Kind::Play(play) => (play.seat, play.source()),
+            Kind::Pass(pass) => (pass.seat, pass.source()),
+            Kind::SpecialActionDeclared(declared) => (declared.seat, declared.source()),
+            _ => return,
+        };
+        if self.live.me != Some(seat) {
+            return;
+        }
+        match source {
+            v1::DecisionSource::Agent => self.is_own = None,
+            v1::DecisionSource::Timeout
+            | v1::DecisionSource::Invalid
+            | v1::DecisionSource::Disconnected
+            | v1::DecisionSource::Substitute => self.lost(),
+            _ => {}
+        }
     }
 
     fn say(&mut self, key: &str, words: String) {
@@ -535,8 +569,10 @@ impl Agent for LanguageModel {
         self.said = v1::Annotations::default();
         // Without a choice there is nothing to ask.
         if legal_count(request) == 1 {
+            self.is_own = Some(false);
             return Some(self.at_once.decide(request));
         }
+        self.is_own = Some(true);
         if !again {
             self.spent.decisions += 1;
             self.before = self.spent.tokens;
@@ -589,14 +625,16 @@ impl Agent for LanguageModel {
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.at_once.on_event(event);
         match &event.kind {
-            Some(v1::game_event::Kind::GameStarted(_)) => {
+            Some(Kind::GameStarted(_)) => {
                 self.live = Live::new(GameView::default(), self.live.me);
                 self.spent = Spent::default();
                 (self.answered, self.left_open, self.described) = (None, None, None);
+                self.is_own = None;
                 (self.silent, self.annotated) = (0, 0);
             }
-            Some(v1::game_event::Kind::ShiftStarted(_)) => self.silent = 0,
-            _ => {}
+            Some(Kind::ShiftStarted(_)) => self.silent = 0,
+            Some(kind) => self.note_source(kind),
+            None => {}
         }
         let events = vec![event.clone()];
         let now_ms = self.now_ms();
@@ -605,6 +643,12 @@ impl Agent for LanguageModel {
     }
 
     fn on_result(&mut self, result: &v1::AnswerResult) {
+        match result.status() {
+            v1::AnswerStatus::Accepted => self.is_own = None,
+            // No event says who gave cards.
+            v1::AnswerStatus::Closed if self.is_own.is_some() => self.lost(),
+            _ => {}
+        }
         match &mut self.answered {
             Some((_, messages)) if result.status() == v1::AnswerStatus::Invalid => {
                 let options = self.live.open.as_ref();
@@ -658,6 +702,63 @@ mod tests {
         }
         assert!((50..100).contains(&with_answers), "{with_answers}");
         assert!(bytes < MAX_ANNOTATION_BYTES_PER_GAME, "{bytes}");
+    }
+
+    #[test]
+    fn decisions_of_the_server_are_not_the_models() {
+        let line = ["llm", "--endpoint", "http://127.0.0.1:1/v1", "--model", "m"];
+        let line = Line::parse_from(line.into_iter().chain(["--max-fallbacks", "0.1"]));
+        let endpoint = line.llm.endpoint(None).expect("an address");
+        let mut model = line.llm.agent(endpoint, [0; 32]);
+        model.live.me = Some(2);
+        let result = |status: v1::AnswerStatus| v1::AnswerResult {
+            status: status.into(),
+            ..v1::AnswerResult::default()
+        };
+        let pass = |seat, source: v1::DecisionSource| {
+            Kind::Pass(v1::Pass {
+                seat,
+                source: source.into(),
+                ..v1::Pass::default()
+            })
+        };
+        let mut asked = |model: &mut LanguageModel| {
+            model.spent.decisions += 1;
+            model.is_own = Some(true);
+        };
+        use v1::AnswerStatus::{Accepted, Closed};
+        use v1::DecisionSource::{Agent, Disconnected, Substitute, Timeout};
+        for _ in 0..17 {
+            asked(&mut model);
+            model.note_source(&pass(2, Agent));
+            model.on_result(&result(Accepted));
+        }
+        // Others may be late. One that is late itself learns of it twice.
+        model.note_source(&pass(1, Timeout));
+        asked(&mut model);
+        model.note_source(&pass(2, Timeout));
+        model.on_result(&result(Closed));
+        // Of gifts only the answer tells.
+        asked(&mut model);
+        model.on_result(&result(Closed));
+        assert_eq!((model.spent.decisions, model.spent.fallbacks), (19, 2));
+        assert!(!model.has_played());
+        // An answer that is sent again after it was accepted.
+        asked(&mut model);
+        model.note_source(&pass(2, Agent));
+        model.on_result(&result(Closed));
+        assert_eq!((model.spent.decisions, model.spent.fallbacks), (20, 2));
+        assert!(model.has_played());
+        // Without its agent the seat is not asked.
+        model.note_source(&pass(2, Disconnected));
+        model.note_source(&pass(2, Substitute));
+        assert_eq!((model.spent.decisions, model.spent.fallbacks), (22, 4));
+        // A fallback that was late itself is counted once.
+        asked(&mut model);
+        model.spent.fallbacks += 1;
+        model.is_own = Some(false);
+        model.note_source(&pass(2, Timeout));
+        assert_eq!((model.spent.decisions, model.spent.fallbacks), (23, 5));
     }
 
     #[test]
