@@ -10,6 +10,7 @@ mod documents;
 mod experiment;
 mod export;
 mod mcp;
+mod open_room;
 mod ratings;
 mod render;
 mod simulate;

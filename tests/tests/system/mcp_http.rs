@@ -2,11 +2,17 @@
 //! Python SDK play whole games over HTTP.
 
 use std::process::Stdio;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_client::v1;
-use chefshat_tests::{Held, Link, TestServer, patiently, set_up};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::scrape;
+use chefshat_server::serve::Server;
+use chefshat_server::store::MemoryStore;
+use chefshat_server::web::Origins;
+use chefshat_tests::{Held, Link, TestServer, get, patiently, set_up};
 use http::{Request, StatusCode};
 use http_body_util::{BodyExt as _, Full};
 use hyper_util::client::legacy::Client as HttpClient;
@@ -14,7 +20,7 @@ use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::TokioExecutor;
 use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::process::{Child, Command};
 
 /// The current revision of the protocol.
@@ -285,6 +291,46 @@ async fn the_seat_of_a_client_that_has_gone_is_given_back() {
         }
     })
     .await;
+}
+
+#[tokio::test]
+async fn the_room_of_a_client_that_has_gone_is_closed() {
+    let store = Arc::new(MemoryStore::default());
+    let server = Server::restored(ServerConfig::default(), store).await;
+    let server = server.expect("an empty store");
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let scraped = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let address = listener.local_addr().expect("bound");
+    let metrics = scraped.local_addr().expect("bound");
+    let names = Origins::new(Vec::new(), Some(Vec::new()));
+    tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics()), names));
+    tokio::spawn(server.serve(listener, std::future::pending()));
+    // The room is in no list.
+    let until_waiting = async |rooms: &str| loop {
+        let text = get(&format!("http://{metrics}/metrics")).await;
+        let waiting = "chefshat_rooms{state=\"waiting\"} ";
+        let count = text.lines().find_map(|line| line.strip_prefix(waiting));
+        if count.expect("it is counted") == rooms {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    };
+    let link = Link::to(address).await;
+    let program = Listening::start_at(&format!("http://{}", link.address), &[]).await;
+    let (_, error) = program.tool("list_rooms", json!({})).await;
+    assert!(!error, "it is connected");
+    link.way().hold(Held::Answers);
+    let params = json!({"name": "create_room", "arguments": {}});
+    let mut connection = program
+        .send(program.request(&[], "tools/call", params))
+        .await;
+    patiently("the room", until_waiting("1")).await;
+    // The client leaves before the program knows its room.
+    connection.shutdown().await.expect("open");
+    let read = patiently("the end", connection.read_to_end(&mut Vec::new())).await;
+    read.expect("the end");
+    link.way().hold(Held::Nothing);
+    patiently("the room to be closed", until_waiting("0")).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

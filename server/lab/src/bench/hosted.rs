@@ -20,9 +20,10 @@ use tokio::io::AsyncWriteExt as _;
 use tokio::process::ChildStdin;
 use tokio::sync::Mutex;
 use tokio::time::{sleep, timeout};
-use tokio_util::task::task_tracker::{TaskTracker, TaskTrackerToken};
+use tokio_util::task::TaskTracker;
 
 use super::folder::Folder;
+use crate::open_room::OpenRoom;
 
 /// Lines of the agent's output that an error shows.
 const LAST_LINES: usize = 8;
@@ -83,28 +84,6 @@ pub(super) async fn play(
         host.stop().await?;
     }
     Ok(())
-}
-
-/// A room that is closed when this is dropped: it would take a place of the server's for as long as it
-/// waits for the agent.
-struct OpenRoom {
-    client: Client,
-    closing: TaskTracker,
-    /// Waiting for `closing` includes this.
-    _token: TaskTrackerToken,
-    /// Its id and its owner token; `None`: its game is over.
-    secrets: Option<(String, String)>,
-}
-
-impl Drop for OpenRoom {
-    fn drop(&mut self) {
-        if let Some((room, owner_token)) = self.secrets.take() {
-            let client = self.client.clone();
-            self.closing.spawn(async move {
-                let _closed = timeout(END, client.close_room(room, owner_token)).await;
-            });
-        }
-    }
 }
 
 /// The games of a run.
@@ -194,27 +173,14 @@ impl Games<'_> {
         deal: usize,
         reads: Option<&Mutex<ChildStdin>>,
     ) -> Result<(), CommandError> {
-        let (client, closing) = (self.client.clone(), self.closing.clone());
         let request = self.folder.task.room(deal);
-        // In a task of its own: if this is dropped meanwhile, the room is closed once it is there.
-        let creating = self.closing.spawn(async move {
-            let created = client.create_room(request).await?;
-            let room = created.room.clone().unwrap_or_default();
-            let secrets = Some((room.room_id.clone(), created.owner_token.clone()));
-            let open = OpenRoom {
-                _token: closing.token(),
-                client,
-                closing,
-                secrets,
-            };
-            Ok::<_, Error>((created, room, open))
-        });
-        let (created, room, mut open) = creating.await??;
+        let (created, open) = OpenRoom::create(self.client, self.closing, request).await?;
+        let room = created.room.unwrap_or_default();
         // Games of hidden deals are private.
         let owner = self.client.with_secrets([&created.owner_token])?;
         self.until_over(&owner, &room, created.join_code, reads)
             .await?;
-        open.secrets = None;
+        open.leave_open();
         let lines = record(&owner, &room.game_id).await?;
         let text = jsonl::text(&lines)?;
         let path = self.folder.record(deal);

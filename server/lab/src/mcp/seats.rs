@@ -10,11 +10,13 @@ use std::time::Duration;
 
 use chefshat_client::{Client, v1};
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
+use futures::future::join_all;
 use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, oneshot};
 use tokio::time::{sleep, timeout};
 use tokio_util::task::TaskTracker;
 
 use super::seat::{ATTACH_TIMEOUT, Seat};
+use crate::open_room::OpenRoom;
 use chefshat_cli::connect::ServerArg;
 use chefshat_cli::error::CommandError;
 use chefshat_cli::language::live::Live;
@@ -45,7 +47,7 @@ pub(super) struct Seats {
     handles: Handles,
     taken: Mutex<BTreeMap<String, Taken>>,
     places: Arc<Semaphore>,
-    /// Seats that are being taken or given back.
+    /// Seats that are being taken or given back, and rooms that are being created or closed.
     working: TaskTracker,
     /// The file that keeps the tickets of games that are not over, one in a line.
     tickets: Option<PathBuf>,
@@ -184,6 +186,17 @@ impl Seats {
         let mut file = AtomicFile::create_private(path)?;
         file.write_all(tickets.as_bytes())?;
         file.finish()
+    }
+
+    /// Creates a room. It is closed unless it is left open, and also if nobody waits for it any more.
+    ///
+    /// # Errors
+    /// The server does not answer or refuses.
+    pub(super) async fn create(
+        &self,
+        request: v1::CreateRoomRequest,
+    ) -> Result<(v1::CreateRoomResponse, OpenRoom), CommandError> {
+        OpenRoom::create(self.client().await?, &self.working, request).await
     }
 
     /// Joins a room; returns the handle of the seat. If it fails after the seat was taken, or nobody
@@ -327,8 +340,9 @@ impl Seats {
             tracing::warn!("a seat may have been taken just now and not given back");
         }
         let seats = std::mem::take(&mut *self.taken());
-        for taken in seats.into_values() {
-            give_back(taken.seat).await;
+        let giving_back = join_all(seats.into_values().map(|taken| give_back(taken.seat)));
+        if timeout(ATTACH_TIMEOUT, giving_back).await.is_err() {
+            tracing::warn!("the server does not answer: seats may not have been given back");
         }
     }
 

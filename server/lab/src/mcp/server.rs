@@ -121,20 +121,15 @@ impl Server {
             }),
             ..v1::CreateRoomRequest::default()
         };
-        let client = self.seats().client().await.map_err(in_words)?;
-        let created = client.create_room(request).await.map_err(in_words)?;
+        let (created, open) = self.seats().create(request).await.map_err(in_words)?;
         let joined = self.join_room(Join {
             join_code: Some(created.join_code),
             name: create.name,
             seat: None,
         });
-        let joined = joined.await;
-        if joined.is_err() {
-            // It would wait for somebody who never comes.
-            let room_id = created.room.unwrap_or_default().room_id;
-            let _closed = client.close_room(room_id, created.owner_token).await;
-        }
-        joined
+        let joined = joined.await?;
+        open.leave_open();
+        Ok(joined)
     }
 
     async fn join_room(&self, join: Join) -> Said {
