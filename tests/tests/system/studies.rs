@@ -517,7 +517,7 @@ pub(crate) fn checked_header(record: &[u8]) -> v1::RecordHeader {
         .collect();
     replay(&lines).expect("the record is right");
     match lines.into_iter().next().and_then(|line| line.line) {
-        Some(Line::Header(header)) => header,
+        Some(Line::Header(header)) => *header,
         _ => panic!("a header comes first"),
     }
 }
