@@ -136,9 +136,13 @@ impl Player {
                     true => "",
                     false => ": too many to call it the model's game",
                 };
+                let unrequested = match spent.unrequested {
+                    0 => String::new(),
+                    count => format!(", and {} that it was not asked for", grouped(count)),
+                };
                 let cost = (model.cost()).map_or_else(String::new, |cost| format!(" ({cost:.4})"));
                 format!(
-                    "{result}, {} tokens{cost} for {} decisions, {} of them without its answer{verdict}",
+                    "{result}, {} tokens{cost} for {} decisions, {} of them without its answer{unrequested}{verdict}",
                     grouped(spent.tokens),
                     grouped(spent.decisions),
                     grouped(spent.fallbacks)
@@ -154,6 +158,7 @@ impl Player {
             result["tokens"] = spent.tokens.into();
             result["decisions"] = spent.decisions.into();
             result["fallbacks"] = spent.fallbacks.into();
+            result["unrequested"] = spent.unrequested.into();
             result["played_by_model"] = model.has_played().into();
             if let Some(cost) = model.cost() {
                 result["cost"] = cost.into();

@@ -414,6 +414,7 @@ async fn without_a_fallback_the_server_decides_and_a_substitute_keeps_the_seat()
     let asked = played.result["decisions"].as_u64().expect("a number");
     assert!(asked < choices.len() as u64, "{asked} of {}", choices.len());
     assert_eq!(played.result["fallbacks"], asked);
+    assert!(played.result["unrequested"].as_u64() > Some(0));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -261,6 +261,9 @@ pub(crate) struct Spent {
     pub(crate) decisions: u64,
     /// Those of them without a usable answer of the model: the fallback's, or the server's.
     pub(crate) fallbacks: u64,
+    /// Decisions that were taken without a request: by the server while the agent was not connected, or
+    /// by a substitute. Nobody knows how many of them had a choice.
+    pub(crate) unrequested: u64,
     /// Tokens in parts.
     usage: Usage,
     /// Whether some have no parts: of questions without an answer, or as the endpoint reports them.
@@ -326,7 +329,14 @@ impl LanguageModel {
 
     /// Whether the fallback and the server have taken so few decisions of the last game that it is the model's.
     pub(crate) fn has_played(&self) -> bool {
-        self.spent.fallbacks as f64 <= self.max_fallbacks * self.spent.decisions as f64
+        let Spent {
+            decisions,
+            fallbacks,
+            unrequested,
+            ..
+        } = self.spent;
+        let most = self.max_fallbacks * (decisions + unrequested) as f64;
+        (fallbacks + unrequested) as f64 <= most
     }
 
     fn now_ms(&self) -> u64 {
@@ -492,12 +502,13 @@ impl LanguageModel {
         Some(self.at_once.decide(request))
     }
 
-    /// Counts a decision of this seat that the server has taken, or a substitute. Nobody knows whether one
-    /// that was not requested had a choice.
+    /// Counts a decision of this seat that the server has taken, or a substitute.
     fn lost(&mut self) {
-        let is_own = self.is_own.take();
-        self.spent.decisions += u64::from(is_own.is_none());
-        self.spent.fallbacks += u64::from(is_own != Some(false));
+        match self.is_own.take() {
+            Some(true) => self.spent.fallbacks += 1,
+            Some(false) => {}
+            None => self.spent.unrequested += 1,
+        }
     }
 
     /// Notes who took a decision of this seat.
@@ -726,6 +737,10 @@ mod tests {
             model.spent.decisions += 1;
             model.is_own = Some(true);
         };
+        let counts = |model: &LanguageModel| {
+            let spent = model.spent;
+            (spent.decisions, spent.fallbacks, spent.unrequested)
+        };
         use v1::AnswerStatus::{Accepted, Closed};
         use v1::DecisionSource::{Agent, Disconnected, Substitute, Timeout};
         for _ in 0..17 {
@@ -741,24 +756,25 @@ mod tests {
         // Of gifts only the answer tells.
         asked(&mut model);
         model.on_result(&result(Closed));
-        assert_eq!((model.spent.decisions, model.spent.fallbacks), (19, 2));
+        assert_eq!(counts(&model), (19, 2, 0));
         assert!(!model.has_played());
         // An answer that is sent again after it was accepted.
         asked(&mut model);
         model.note_source(&pass(2, Agent));
         model.on_result(&result(Closed));
-        assert_eq!((model.spent.decisions, model.spent.fallbacks), (20, 2));
+        assert_eq!(counts(&model), (20, 2, 0));
         assert!(model.has_played());
         // Without its agent the seat is not asked.
         model.note_source(&pass(2, Disconnected));
         model.note_source(&pass(2, Substitute));
-        assert_eq!((model.spent.decisions, model.spent.fallbacks), (22, 4));
+        assert_eq!(counts(&model), (20, 2, 2));
+        assert!(!model.has_played());
         // A fallback that was late itself is counted once.
         asked(&mut model);
         model.spent.fallbacks += 1;
         model.is_own = Some(false);
         model.note_source(&pass(2, Timeout));
-        assert_eq!((model.spent.decisions, model.spent.fallbacks), (23, 5));
+        assert_eq!(counts(&model), (21, 3, 2));
     }
 
     #[test]
