@@ -733,7 +733,7 @@ mod tests {
                 ..v1::Pass::default()
             })
         };
-        let mut asked = |model: &mut LanguageModel| {
+        let asked = |model: &mut LanguageModel| {
             model.spent.decisions += 1;
             model.is_own = Some(true);
         };
