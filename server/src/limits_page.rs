@@ -286,7 +286,7 @@ fn of_each() -> String {
             ),
         ),
         (
-            "wrong join codes",
+            "wrong join codes (the code of a tournament is none, also where a room is asked for)",
             format!(
                 "{}, networks of IPv6 in one /48 together; beyond {} of all clients, who has just sent one is refused",
                 rate(calls::WRONG_CODES_PER_SECOND, calls::WRONG_CODES_AT_ONCE),

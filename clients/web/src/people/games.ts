@@ -82,9 +82,6 @@ export function ownGame(record: RecordSummary, name: string, fingerprint = ""): 
 /** Why a game with a result is not rated. */
 export type Unrated = "added" | "hidden" | "hinted" | "notDealt" | "recorded" | "substituted" | "twice" | "wizard";
 
-/** Origins of games that are rated. */
-const RATED_ORIGINS = [GameOrigin.DEALT, GameOrigin.PHYSICAL];
-
 /** How games end early that are rated as lost by those who left or closed them. */
 const BROKEN_OFF = [AbortReason.CLOSED, AbortReason.PARTICIPANTS_LOST];
 
@@ -113,7 +110,7 @@ function unratedFromStart(record: RecordSummary): Unrated | null {
   if (record.added) return "added";
   // In responses, public is unspecified.
   if (record.visibility !== Visibility.UNSPECIFIED) return "hidden";
-  if (!RATED_ORIGINS.includes(record.origin)) return "notDealt";
+  if (record.origin !== GameOrigin.DEALT) return "notDealt";
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
   if (record.seats.some(({ shownKind }) => shownKind !== ParticipantKind.UNSPECIFIED)) return "wizard";
   const participants = record.seats.map(({ kind, name, builtInAgent, nameFingerprint }) => {

@@ -34,7 +34,7 @@ export const people: Texts["people"] = {
     conditions: [
       "alle sie finden können: sie ist weder „nicht gelistet“ noch privat;",
       "sie bis zum Ende gespielt oder von abwesenden Teilnehmern oder ihrem mitspielenden Besitzer abgebrochen wurde;",
-      "der Server die Karten nach einem eigenen Seed ausgeteilt hat oder sie dort mit echten Karten gespielt wurde: kein fester Seed, keine vorgegebenen Blätter, keine Abzweigung einer anderen Partie, keine anderswo gespielte Partie;",
+      "der Server die Karten nach einem eigenen Seed ausgeteilt hat: kein fester Seed, keine vorgegebenen Blätter, keine Abzweigung einer anderen Partie, keine Partie mit echten Karten, keine anderswo gespielte Partie;",
       "auf jedem Platz ein anderer Teilnehmer saß, nach Name, Schlüssel und Art: nicht zweimal derselbe eingebaute Agent oder dieselbe Person, kein aufgezeichneter Spieler und niemand, der als Roboter spielte.",
     ],
     losing:

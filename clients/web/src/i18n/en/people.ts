@@ -30,7 +30,7 @@ export const people = {
     conditions: [
       "everybody can find it: it is neither unlisted nor private;",
       "it was played to the end, or broken off by participants who were away or by its owner, who played in it;",
-      "the server dealt it from its own seed, or it was played there with real cards: no fixed seed, no prescribed hands, no branch of another game, no game played elsewhere;",
+      "the server dealt it from its own seed: no fixed seed, no prescribed hands, no branch of another game, no game with real cards or played elsewhere;",
       "every seat had a different participant, by name, key and kind: not the same built-in agent twice, nor the same person, no recorded player, and nobody who played as a robot.",
     ],
     losing:

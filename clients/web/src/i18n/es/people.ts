@@ -41,7 +41,7 @@ export const people: Texts["people"] = {
     conditions: [
       "todos pueden encontrarla: no está sin listar ni es privada;",
       "se jugó hasta el final, o la interrumpieron participantes ausentes o su propietario, que jugaba en ella;",
-      "el servidor repartió las cartas con una semilla propia, o se jugó allí con cartas reales: sin semilla fija, sin manos fijadas de antemano, ni variante de otra partida, ni partida jugada en otro sitio;",
+      "el servidor repartió las cartas con una semilla propia: sin semilla fija, sin manos fijadas de antemano, ni variante de otra partida, ni partida con cartas reales o jugada en otro sitio;",
       "cada asiento tenía un participante distinto, por nombre, clave y tipo: ni dos veces el mismo agente integrado, ni la misma persona, ningún jugador grabado y nadie que jugara como robot.",
     ],
     losing:

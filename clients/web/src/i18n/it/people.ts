@@ -38,7 +38,7 @@ export const people: Texts["people"] = {
     conditions: [
       "tutti possono trovarla: è in elenco e non su invito;",
       "è stata giocata fino alla fine, o interrotta da partecipanti assenti o dal proprietario che vi giocava;",
-      "il server ha distribuito le carte con un proprio seme, o è stata giocata lì con carte vere: nessun seme fissato, nessuna mano prestabilita, nessuna variante di un’altra partita, nessuna partita giocata altrove;",
+      "il server ha distribuito le carte con un proprio seme: nessun seme fissato, nessuna mano prestabilita, nessuna variante di un’altra partita, nessuna partita con carte vere o giocata altrove;",
       "ogni posto aveva un partecipante diverso, per nome, chiave e tipo: non due volte lo stesso agente integrato, né la stessa persona, nessun giocatore registrato e nessuno che giocasse come robot.",
     ],
     losing:
