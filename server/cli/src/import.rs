@@ -71,10 +71,7 @@ impl Import {
             (true, true) => jsonl::copy(&self.file, &path)?,
             (true, false) => jsonl::write(&path, &lines)?,
             (false, true) => jsonl::copy_private(&self.file, &path)?,
-            (false, false) => jsonl::write_private(&path, |write| {
-                lines.iter().for_each(write);
-                Ok(())
-            })?,
+            (false, false) => jsonl::write_private(&path, jsonl::all_of(&lines))?,
         }
         self.print(&path, header, &replayed)?;
         Ok(ExitCode::SUCCESS)

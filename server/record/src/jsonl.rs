@@ -130,10 +130,15 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
     }
     let file = AtomicFile::create(path)?;
-    write_to(file, path, |write| {
+    write_to(file, path, all_of(lines))
+}
+
+/// Passes on lines that are all in memory, for [`write_private`].
+pub fn all_of(lines: &[RecordLine]) -> impl FnOnce(&mut dyn FnMut(&RecordLine)) -> io::Result<()> {
+    move |write| {
         lines.iter().for_each(write);
         Ok(())
-    })
+    }
 }
 
 /// Copies the text of a record atomically, creating parent folders.

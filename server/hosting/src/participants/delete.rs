@@ -199,10 +199,7 @@ fn redact(
         return Ok(None);
     }
     let lines = stored.unwrap_or(lines);
-    let written = jsonl::write_private(&candidate.path, |write| {
-        lines.iter().for_each(write);
-        Ok(())
-    });
+    let written = jsonl::write_private(&candidate.path, jsonl::all_of(&lines));
     written
         .map(|()| Some(redactions))
         .map_err(|error| error.to_string())
