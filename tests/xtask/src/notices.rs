@@ -12,7 +12,7 @@ use crate::failure::Failure;
 use crate::places::Places;
 use crate::setup::at;
 
-/// The licences of what is no package, with what they are of: the fonts of pictures, and what every
+/// Licences of what is not a package, each with what it covers: the fonts of pictures, and what every
 /// static program contains.
 const OTHERS: [(&str, &str); 3] = [
     (

@@ -7,8 +7,8 @@ const SHORTEST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 16_000;
 
 /**
- * The answer; undefined if it is not wanted any more, or the server will not give it. `onFault` is told
- * why each request failed.
+ * The answer; undefined if nobody waits for it any more, or the server refuses. `onFault` is told why
+ * each request failed.
  */
 export async function askUntilAnswered<Answer>(
   ask: () => Promise<Answer>,
