@@ -8,12 +8,14 @@ use chefshat_engine::ActionId;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::rollout::{Worth, rollout};
+use crate::rollout::{Worth, rollouts};
 use crate::{Chance, RolloutPolicy, Sampler};
 
 /// Deals that are played before the first look whether to stop, and most of them between two looks.
 /// In between it is an eighth of those played so far. Never depends on the number of threads.
 const BATCH: RangeInclusive<u64> = 4..=256;
+/// Rollouts that one thread plays at a time. More would leave the fast memory of a processor.
+const SIDE_BY_SIDE: u64 = 64;
 
 /// What one action is worth.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
@@ -234,24 +236,23 @@ impl Evaluation {
                 .min(self.deals_left()),
         };
         let batch = self.worlds..self.worlds + deals;
-        let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);
-        let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
+        let found = in_parts(batch.clone(), tried.len(), pool, |part| {
+            let mut found: Vec<Estimate> = tried.iter().map(|id| Estimate::new(*id)).collect();
+            for worths in worths_in(sampler, &tried, &method.policy, seed, part) {
+                let reference = worths[0];
+                for (estimate, worth) in found.iter_mut().zip(worths) {
+                    estimate.add(worth, reference);
+                }
+            }
+            found
+        });
+        let found = found.into_iter().reduce(|mut all, more| {
             all.iter_mut()
                 .zip(&more)
                 .for_each(|(all, more)| all.merge(more));
             all
-        };
-        let empty = || tried.iter().map(|id| Estimate::new(*id)).collect();
-        let found: Vec<Estimate> = match pool {
-            Some(pool) => pool.install(|| {
-                batch
-                    .clone()
-                    .into_par_iter()
-                    .map(in_world)
-                    .reduce(empty, merged)
-            }),
-            None => batch.clone().map(in_world).fold(empty(), merged),
-        };
+        });
+        let found = found.expect("a batch has deals");
         for (&index, found) in self.active.iter().zip(&found) {
             self.estimates[index].merge(found);
             self.rollouts += found.rollouts;
@@ -286,44 +287,52 @@ pub fn outcomes(
     deals: Range<u64>,
     pool: Option<&ThreadPool>,
 ) -> Vec<Vec<Worth>> {
-    let of_deal = |deal| worths_in(sampler, actions, policy, seed, deal).collect();
+    let parts = in_parts(deals, actions.len(), pool, |part| {
+        worths_in(sampler, actions, policy, seed, part).collect::<Vec<_>>()
+    });
+    parts.into_iter().flatten().collect()
+}
+
+/// Calls `of_part` with parts of these deals, in each of which these many actions are tried side by
+/// side, and returns what it does in their order.
+fn in_parts<T: Send>(
+    deals: Range<u64>,
+    actions: usize,
+    pool: Option<&ThreadPool>,
+    of_part: impl Fn(Range<u64>) -> T + Send + Sync,
+) -> Vec<T> {
+    let threads = pool.map_or(1, ThreadPool::current_num_threads) as u64;
+    let number = (deals.end - deals.start).div_ceil(threads);
+    let size = number.clamp(1, (SIDE_BY_SIDE / actions as u64).max(1));
+    let parts: Vec<Range<u64>> = (deals.start..deals.end)
+        .step_by(size as usize)
+        .map(|first| first..deals.end.min(first + size))
+        .collect();
     match pool {
-        Some(pool) => pool.install(|| deals.into_par_iter().map(of_deal).collect()),
-        None => deals.map(of_deal).collect(),
+        Some(pool) => pool.install(|| parts.into_par_iter().map(of_part).collect()),
+        None => parts.into_iter().map(of_part).collect(),
     }
 }
 
-/// Tries actions in one deal.
-fn evaluate_in(
-    sampler: &Sampler,
-    actions: &[ActionId],
-    policy: &RolloutPolicy,
-    seed: [u8; 32],
-    world: u64,
-) -> Vec<Estimate> {
-    let mut reference = None;
-    (actions.iter())
-        .zip(worths_in(sampler, actions, policy, seed, world))
-        .map(|(&action, worth)| {
-            let mut estimate = Estimate::new(action);
-            estimate.add(worth, *reference.get_or_insert(worth));
-            estimate
-        })
-        .collect()
-}
-
-/// What each action brings in one deal.
+/// What each action brings in each of these deals, a row by action.
 fn worths_in(
     sampler: &Sampler,
     actions: &[ActionId],
     policy: &RolloutPolicy,
     seed: [u8; 32],
-    world: u64,
-) -> impl Iterator<Item = Worth> {
-    let mut chance = Chance::stream(seed, world);
-    let game = sampler.game(&mut chance).closing_copy();
-    let (agents, seat) = (chance.seed(), sampler.knowledge().seat());
-    (actions.iter()).map(move |&action| rollout(game.clone(), action, seat, policy, agents))
+    deals: Range<u64>,
+) -> impl Iterator<Item = Vec<Worth>> {
+    let starts = deals.flat_map(|deal| {
+        let mut chance = Chance::stream(seed, deal);
+        let game = sampler.game(&mut chance).closing_copy();
+        let agents = chance.seed();
+        (actions.iter()).map(move |&action| (game.clone(), action, agents))
+    });
+    let mut worths = rollouts(starts, sampler.knowledge().seat(), policy).into_iter();
+    std::iter::from_fn(move || {
+        let row: Vec<Worth> = worths.by_ref().take(actions.len()).collect();
+        (!row.is_empty()).then_some(row)
+    })
 }
 
 /// Expected cards in each hand, by seat and kind (faces ascending, then jokers), over deals of the

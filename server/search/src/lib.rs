@@ -19,5 +19,5 @@ pub use evaluate::{
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
 pub use own_time::OwnTime;
-pub use rollout::{RolloutPolicy, Worth, choose, play_on, rollout};
+pub use rollout::{RolloutPolicy, Worth, choose, play_on, rollouts};
 pub use sampler::{Chance, Sampler};

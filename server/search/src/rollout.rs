@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use chefshat_agents::{AgentKind, BuiltInAgent, Network};
+use chefshat_agents::{AgentKind, BuiltInAgent, Network, NetworkBatch};
 use chefshat_engine::{ActionId, BySeat, Event, Game, MAX_SEATS, Seat, Viewer};
 
 /// The agents that play all seats in rollouts.
@@ -18,6 +18,15 @@ impl RolloutPolicy {
     /// The agent of this name: `random`, `greedy` or `trained`.
     pub fn from_name(name: &str) -> Option<RolloutPolicy> {
         AgentKind::of_rollouts(name).map(RolloutPolicy::Kind)
+    }
+
+    /// The network by which all seats play, if it decides alone.
+    fn shared_network(&self) -> Option<&Network> {
+        match self {
+            RolloutPolicy::Kind(AgentKind::Trained) => Some(Network::trained()),
+            RolloutPolicy::Kind(_) => None,
+            RolloutPolicy::Network(network) => Some(network),
+        }
     }
 
     fn agent(&self, seed: [u8; 32]) -> BuiltInAgent {
@@ -37,39 +46,81 @@ pub struct Worth {
     pub place: u8,
 }
 
-/// Applies an action to a game that ends with its Shift, then lets agents play all seats
-/// until the place of `seat` is known. `seed` determines their random choices.
+/// Applies its action to each game, which ends with its Shift, then lets agents play all seats until
+/// the place of `seat` is known. The seed beside a game determines their random choices. The games
+/// are played side by side, so that a network decides for many of them at a time; each result is that
+/// of the game alone.
 ///
 /// # Panics
-/// If the action is not legal.
-pub fn rollout(
-    mut game: Game,
-    action: ActionId,
+/// If an action is not legal.
+pub fn rollouts(
+    starts: impl IntoIterator<Item = (Game, ActionId, [u8; 32])>,
     seat: Seat,
     policy: &RolloutPolicy,
-    seed: [u8; 32],
-) -> Worth {
-    let mut agents = Agents::new(|_| policy, seed);
-    let mut place = None;
-    let mut action = action;
-    loop {
-        game.apply(action, |event| match event {
-            Event::SeatFinished {
-                seat: finished,
-                place: reached,
-            } if finished == seat => place = Some(reached),
-            Event::ShiftEnded(end) => place = place.or(end.order.place_of(seat)),
-            _ => {}
-        })
-        .expect("a legal action");
-        if let Some(place) = place {
-            return Worth {
-                points: game.rules().points(place),
-                place,
-            };
-        }
-        action = agents.decide(&game);
+) -> Vec<Worth> {
+    if let Some(network) = policy.shared_network() {
+        return side_by_side(starts, seat, network);
     }
+    let alone = |(mut game, mut action, seed): (Game, ActionId, [u8; 32])| {
+        let mut agents = Agents::new(|_| policy, seed);
+        loop {
+            if let Some(worth) = worth_after(&mut game, action, seat) {
+                return worth;
+            }
+            action = agents.decide(&game);
+        }
+    };
+    starts.into_iter().map(alone).collect()
+}
+
+/// Plays games as [`rollouts`] says, all seats by one network.
+fn side_by_side(
+    starts: impl IntoIterator<Item = (Game, ActionId, [u8; 32])>,
+    seat: Seat,
+    network: &Network,
+) -> Vec<Worth> {
+    let (mut worths, mut going) = (Vec::new(), Vec::new());
+    for (place, (game, action, _)) in starts.into_iter().enumerate() {
+        worths.push(Worth::default());
+        going.push((place, game, action));
+    }
+    let mut batch = NetworkBatch::default();
+    while !going.is_empty() {
+        going.retain_mut(|(place, game, action)| {
+            loop {
+                if let Some(worth) = worth_after(game, *action, seat) {
+                    worths[*place] = worth;
+                    return false;
+                }
+                let decision = game.decision().expect("the Shift is not over");
+                let observation = game.observe(Viewer::Seat(decision.seat));
+                match network.decide_or_wait(&observation, &game.legal_actions(), &mut batch) {
+                    Some(known) => *action = known,
+                    None => return true,
+                }
+            }
+        });
+        network.decide_all(&mut batch, |waited, chosen| going[waited].2 = chosen);
+    }
+    worths
+}
+
+/// Applies an action, and says what the Shift is worth to a seat once its place is known.
+fn worth_after(game: &mut Game, action: ActionId, seat: Seat) -> Option<Worth> {
+    let mut place = None;
+    game.apply(action, |event| match event {
+        Event::SeatFinished {
+            seat: finished,
+            place: reached,
+        } if finished == seat => place = Some(reached),
+        Event::ShiftEnded(end) => place = place.or(end.order.place_of(seat)),
+        _ => {}
+    })
+    .expect("a legal action");
+    place.map(|place| Worth {
+        points: game.rules().points(place),
+        place,
+    })
 }
 
 /// Lets agents, one policy for each seat, play a game that ends with its Shift to that end. `seed`

@@ -9,7 +9,7 @@ use chefshat_agents::{
 };
 use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, RuleSetSpec, Seat};
 use chefshat_search::{
-    Chance, Knowledge, MARGIN, RolloutPolicy, Sampler, Searchers, ShiftHistory, rollout,
+    Chance, Knowledge, MARGIN, RolloutPolicy, Sampler, Searchers, ShiftHistory, rollouts,
 };
 use chefshat_simulation::{Comparison, Contender, Duplicate, SeatPlan};
 use clap::{Parser, ValueEnum};
@@ -219,7 +219,8 @@ fn try_once(arm: &mut Arm, sampler: &Sampler, seed: [u8; 32]) {
     let seat = sampler.knowledge().seat();
     let most = (game.rules().points(1)).max(1);
     let policy = RolloutPolicy::Kind(AgentKind::Trained);
-    let worth = rollout(game, arm.action, seat, &policy, chance.seed());
+    let start = (game, arm.action, chance.seed());
+    let worth = rollouts([start], seat, &policy)[0];
     let worth = f64::from(worth.points) / f64::from(most);
     arm.sum += worth;
     arm.worths.push(worth);

@@ -4,7 +4,7 @@ use chefshat_agents::{AgentKind, AgentMaker as _, Budget, BuiltInAgent, MonteCar
 use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
 use chefshat_search::{
     Allocation, Chance, Estimate, Evaluation, Method, RolloutPolicy, Sampler, Searchers, evaluate,
-    likely_hands, outcomes, play_on,
+    likely_hands, outcomes, play_on, rollouts,
 };
 
 use crate::scenario::{Moment, Scenario};
@@ -85,6 +85,37 @@ fn a_limit_of_rollouts_is_kept() {
             let all: u64 = evaluation.estimates().iter().map(count).sum();
             let expected = most.max(4 * actions);
             assert!(all <= expected && all + actions > expected, "{all} {most}");
+        }
+    }
+}
+
+#[test]
+fn rollouts_side_by_side_are_those_of_each_game_alone() {
+    let scenario = Scenario::random(rules(11, 4), 5, Some(&[1, 3, 0, 2]));
+    let moment = busiest(&scenario);
+    let (sampler, legal) = (sampler(&scenario, moment), scenario.legal(moment));
+    let seat = sampler.knowledge().seat();
+    for kind in [AgentKind::Trained, AgentKind::Random] {
+        let policy = RolloutPolicy::Kind(kind);
+        let start = |deal| {
+            let game = sampler.game(&mut Chance::stream([4; 32], deal));
+            let action = legal.nth(deal as usize % legal.len());
+            (
+                game.closing_copy(),
+                action.expect("an action"),
+                [deal as u8; 32],
+            )
+        };
+        let together = rollouts((0..60).map(start), seat, &policy);
+        for (deal, together) in (0..60).zip(together) {
+            let (mut game, action, seed) = start(deal);
+            game.apply(action, |_| {}).expect("a legal action");
+            let policies = vec![policy.clone(); 4];
+            assert_eq!(
+                play_on(game, &policies, seed)[seat],
+                together,
+                "{kind:?} {deal}"
+            );
         }
     }
 }
