@@ -141,6 +141,9 @@ class Position:
     def expected_hands(self, deals: int, seed: int) -> NDArray[np.float64]:
         """The cards that each seat holds on average over these deals, one seat after the other."""
 
+    def log_likelihoods(self, deals: int, seed: int, policy: str | bytes) -> NDArray[np.float64]:
+        """The natural logarithm of the likelihood of what the others did, for each of these deals."""
+
     def evaluate(
         self,
         actions: Sequence[int],

@@ -285,6 +285,17 @@ def test_the_sample_that_improves_a_policy(capsys: pytest.CaptureFixture[str]) -
     assert "points a Shift" in capsys.readouterr().out
 
 
+def test_the_sample_of_beliefs(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("safetensors")
+    belief = sample_module("belief")
+    belief.main(positions=2)
+    assert capsys.readouterr().out.count("one of 64 ") == 3
+    # Two groups of two deals, with one card each: the second deal of each is three times as likely.
+    hands, logs = np.array([[[0.0]], [[1.0]], [[0.0]], [[4.0]]]), np.log([1.0, 3.0, 2.0, 6.0])
+    np.testing.assert_allclose(belief.guess(hands, logs, 2), [[0.75 * 5 / 2]])
+    np.testing.assert_allclose(belief.guess(hands, logs, 1), [[5 / 4]])
+
+
 def busy_position(actions: int = 4) -> Position:
     """Returns the first decision among more than this number of actions."""
     return next(position for _, position in positions(2) if len(position.legal_actions) > actions)
@@ -330,6 +341,19 @@ def test_weights_of_deals() -> None:
     for wrong in (np.ones(39), np.zeros(40), np.full(40, np.nan), [-1.0, *np.ones(39)]):
         with pytest.raises(ValueError, match="a finite number of 0 or more for each of the 40 deals"):
             tried.estimates(wrong)
+
+
+def test_likelihoods_of_deals() -> None:
+    position = busy_position()
+    logs = position.log_likelihoods(60, seed=2)
+    assert logs.shape == (60,)
+    assert (logs <= 0).all()
+    assert np.ptp(logs) > 0.1
+    np.testing.assert_array_equal(logs[:40], position.log_likelihoods(40, seed=2))
+    even, found = position.evaluate(deals=60, seed=2), position.evaluate(deals=60, seed=2, weights=np.exp(logs - logs.max()))
+    assert not np.allclose(even.points, found.points)
+    with pytest.raises(ChefsHatError, match="only a network for these rules"):
+        position.log_likelihoods(4, "greedy")
 
 
 def test_worlds_played_on() -> None:

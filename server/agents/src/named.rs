@@ -112,13 +112,16 @@ pub enum Budget {
 }
 
 /// How the agent `monte_carlo` plays. As text: `monte_carlo`, then optionally `:` and the budget of a
-/// decision (`50ms` or a number of rollouts), then optionally `:` and the agent of the rollouts.
+/// decision (`50ms` or a number of rollouts), then optionally `:` and the agent of the rollouts, then
+/// optionally `:belief`.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub struct MonteCarlo {
     /// What a decision may cost.
     pub budget: Budget,
     /// The agents of the rollouts.
     pub rollouts: AgentKind,
+    /// Whether deals are likelier in which `trained` would have decided as the others did.
+    pub belief: bool,
     /// The agent whose action is taken unless another gains points. The text does not set it.
     pub prior: AgentKind,
 }
@@ -126,6 +129,8 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// The name in messages and commands.
     pub const NAME: &str = "monte_carlo";
+    /// The word for [`MonteCarlo::belief`].
+    const BELIEF: &str = "belief";
 }
 
 impl Default for MonteCarlo {
@@ -133,6 +138,7 @@ impl Default for MonteCarlo {
         Self {
             budget: Budget::Time(Duration::from_millis(50)),
             rollouts: AgentKind::Trained,
+            belief: false,
             prior: AgentKind::Trained,
         }
     }
@@ -141,7 +147,7 @@ impl Default for MonteCarlo {
 /// Why a text names no agent that searches.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 #[error(
-    "{0}: write monte_carlo, monte_carlo:50ms, monte_carlo:64 (rollouts) or monte_carlo:50ms:greedy (the agent of the rollouts: random, greedy or trained)"
+    "{0}: write monte_carlo, monte_carlo:50ms, monte_carlo:64 (rollouts) or monte_carlo:50ms:greedy (the agent of the rollouts: random, greedy or trained), and :belief after any of them"
 )]
 pub struct MonteCarloError(String);
 
@@ -150,7 +156,11 @@ impl FromStr for MonteCarlo {
 
     fn from_str(text: &str) -> Result<Self, MonteCarloError> {
         let mut agent = Self::default();
-        let mut parts = text.split(':');
+        let believes = text
+            .strip_suffix(Self::BELIEF)
+            .and_then(|rest| rest.strip_suffix(':'));
+        agent.belief = believes.is_some();
+        let mut parts = believes.unwrap_or(text).split(':');
         let named = parts.next() == Some(Self::NAME);
         let budget = parts.next().map(|budget| match budget.strip_suffix("ms") {
             Some(ms) => (ms.parse().ok())
@@ -183,6 +193,9 @@ impl fmt::Display for MonteCarlo {
         }
         if self.rollouts != Self::default().rollouts {
             write!(f, ":{}", self.rollouts.name())?;
+        }
+        if self.belief {
+            write!(f, ":{}", Self::BELIEF)?;
         }
         Ok(())
     }

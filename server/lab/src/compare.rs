@@ -51,7 +51,8 @@ The same seed gives the same output, on any number of threads, unless monte_carl
 )]
 pub(super) struct Compare {
     /// A built-in agent or a network file. monte_carlo takes a budget for each decision and the
-    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:400:greedy (rollouts).
+    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:400:greedy (rollouts). With :belief, as in
+    /// monte_carlo:50ms:belief, it guesses hands from what the others did.
     a: String,
     /// The agent to compare it with.
     b: String,

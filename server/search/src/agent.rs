@@ -4,13 +4,15 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use chefshat_agents::{AgentMaker, Budget, BuiltInAgent, Following, MonteCarlo, NamedAgent};
+use chefshat_agents::{
+    AgentMaker, Budget, BuiltInAgent, Following, MonteCarlo, NamedAgent, Network,
+};
 use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
 use rayon::ThreadPool;
 
 use crate::{
-    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, OwnTime, RolloutPolicy,
-    Sampler, ShiftHistory, evaluate,
+    Allocation, Belief, Chance, Estimate, Knowledge, KnowledgeError, Method, OwnTime,
+    RolloutPolicy, Sampler, ShiftHistory, evaluate,
 };
 
 /// Steps of counting deals that the agent spends on a decision at most.
@@ -177,9 +179,11 @@ impl Choice<'_> {
         let sampler = Sampler::new(knowledge, MAX_STEPS)?;
         let others = self.legal.iter().filter(|action| *action != self.prior);
         let actions: Vec<ActionId> = std::iter::once(self.prior).chain(others).collect();
+        let belief = (plays.belief).then(|| Belief::of(Network::trained(), &self.rules));
         let method = Method {
             policy: RolloutPolicy::Kind(plays.rollouts),
             allocation,
+            belief: belief.flatten(),
         };
         let progress = |rollouts: u64| match plays.budget {
             _ if stopped() => 1.0,

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::rollout::{Worth, rollouts};
-use crate::{Chance, RolloutPolicy, Sampler};
+use crate::{Belief, Chance, RolloutPolicy, Sampler};
 
 /// Deals that are played before the first look whether to stop, and most of them between two looks.
 /// In between it is an eighth of those played so far. Never depends on the number of threads.
@@ -124,6 +124,8 @@ pub struct Method {
     pub policy: RolloutPolicy,
     /// How rollouts are shared among the actions.
     pub allocation: Allocation,
+    /// What the decisions of others say about their hands; `None`: nothing, as `docs/search.md` says.
+    pub belief: Option<Belief>,
 }
 
 /// Estimates what actions are worth at the sampler's decision: first those of `actions[0]`, to which
@@ -238,7 +240,7 @@ impl Evaluation {
         let batch = self.worlds..self.worlds + deals;
         let found = in_parts(batch.clone(), tried.len(), pool, |part| {
             let mut found: Vec<Estimate> = tried.iter().map(|id| Estimate::new(*id)).collect();
-            for worths in worths_in(sampler, &tried, &method.policy, seed, part) {
+            for worths in worths_in(sampler, &tried, method, seed, part) {
                 let reference = worths[0];
                 for (estimate, worth) in found.iter_mut().zip(worths) {
                     estimate.add(worth, reference);
@@ -274,21 +276,21 @@ fn halve(active: &mut Vec<usize>, estimates: &[Estimate]) {
     active.truncate(active.len().div_ceil(2).max(2));
 }
 
-/// What each action brings in each of these deals, which are those of an evaluation with this seed:
-/// for each deal a row by action. A pool of threads does not change the result.
+/// What each action brings in each of these deals, which are those of an evaluation with this method
+/// and seed: for each deal a row by action. A pool of threads does not change the result.
 ///
 /// # Panics
 /// If an action is not legal.
 pub fn outcomes(
     sampler: &Sampler,
     actions: &[ActionId],
-    policy: &RolloutPolicy,
+    method: &Method,
     seed: [u8; 32],
     deals: Range<u64>,
     pool: Option<&ThreadPool>,
 ) -> Vec<Vec<Worth>> {
     let parts = in_parts(deals, actions.len(), pool, |part| {
-        worths_in(sampler, actions, policy, seed, part).collect::<Vec<_>>()
+        worths_in(sampler, actions, method, seed, part).collect::<Vec<_>>()
     });
     parts.into_iter().flatten().collect()
 }
@@ -318,17 +320,20 @@ fn in_parts<T: Send>(
 fn worths_in(
     sampler: &Sampler,
     actions: &[ActionId],
-    policy: &RolloutPolicy,
+    method: &Method,
     seed: [u8; 32],
     deals: Range<u64>,
 ) -> impl Iterator<Item = Vec<Worth>> {
     let starts = deals.flat_map(|deal| {
         let mut chance = Chance::stream(seed, deal);
-        let game = sampler.game(&mut chance).closing_copy();
-        let agents = chance.seed();
+        let game = match &method.belief {
+            Some(belief) => belief.game(sampler, &mut chance),
+            None => sampler.game(&mut chance),
+        };
+        let (game, agents) = (game.closing_copy(), chance.seed());
         (actions.iter()).map(move |&action| (game.clone(), action, agents))
     });
-    let mut worths = rollouts(starts, sampler.knowledge().seat(), policy).into_iter();
+    let mut worths = rollouts(starts, sampler.knowledge().seat(), &method.policy).into_iter();
     std::iter::from_fn(move || {
         let row: Vec<Worth> = worths.by_ref().take(actions.len()).collect();
         (!row.is_empty()).then_some(row)

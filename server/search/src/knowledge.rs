@@ -228,7 +228,7 @@ impl Knowledge {
     /// # Errors
     /// If the deal does not lead to what the seat sees.
     pub fn game(&self, world: &World, later: Seed) -> Result<Game, KnowledgeError> {
-        self.replay(world, later, |_| {})
+        self.replay(world, later, |_, _| {})
             .ok_or(KnowledgeError::Inconsistent)
     }
 
@@ -239,13 +239,19 @@ impl Knowledge {
     /// As [`Knowledge::game`].
     pub fn start(&self, world: &World) -> Result<(Script, Vec<ActionId>), KnowledgeError> {
         let mut actions = Vec::new();
-        self.replay(world, Seed([0; 32]), |action| actions.push(action))
+        self.replay(world, Seed([0; 32]), |_, action| actions.push(action))
             .and_then(|_| Some((self.script(world)?, actions)))
             .ok_or(KnowledgeError::Inconsistent)
     }
 
     /// The game if this is the deal, and if it leads to what the seat sees.
-    fn replay(&self, world: &World, later: Seed, on_action: impl FnMut(ActionId)) -> Option<Game> {
+    /// Shows every decision on the way with its action.
+    pub(crate) fn replay(
+        &self,
+        world: &World,
+        later: Seed,
+        on_action: impl FnMut(&Game, ActionId),
+    ) -> Option<Game> {
         self.played(world, later, on_action).filter(|game| {
             let seen = game.observe(Viewer::Seat(self.seat));
             let observed = Observation {
@@ -276,7 +282,7 @@ impl Knowledge {
         &self,
         world: &World,
         later: Seed,
-        mut on_action: impl FnMut(ActionId),
+        mut on_action: impl FnMut(&Game, ActionId),
     ) -> Option<Game> {
         let script = self.script(world)?;
         let mut game = Game::scripted(self.rules, later, &script, |_| {}).ok()?;
@@ -305,8 +311,8 @@ impl Knowledge {
                     None => return Some(game),
                 },
             };
+            on_action(&game, action);
             game.apply(action, |_| {}).ok()?;
-            on_action(action);
         }
         None
     }

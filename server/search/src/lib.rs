@@ -3,6 +3,7 @@
 //! exact.
 
 mod agent;
+mod belief;
 mod evaluate;
 mod history;
 mod holders;
@@ -13,6 +14,7 @@ mod sampler;
 mod table;
 
 pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, show_nothing, suggested};
+pub use belief::Belief;
 pub use evaluate::{
     Allocation, Estimate, Evaluation, LikelyHands, Method, evaluate, likely_hands, outcomes,
 };

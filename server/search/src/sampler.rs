@@ -37,6 +37,16 @@ impl Chance {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// A place in these weights, drawn by weight.
+    pub(crate) fn weighted(&mut self, weights: &[f64]) -> usize {
+        let mut rest = self.unit() * weights.iter().sum::<f64>();
+        let reached = weights.iter().position(|weight| {
+            rest -= weight;
+            rest < 0.0
+        });
+        reached.unwrap_or(weights.len() - 1)
+    }
+
     /// A number below `n`.
     fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.0.next_u64()) * n as u128) >> 64) as usize

@@ -5,14 +5,14 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use chefshat_agents::Network;
+use chefshat_agents::{AgentKind, Network};
 use chefshat_engine::{ActionId, Event, Game, Observation, RuleSet, Seat};
 use chefshat_proto::v1;
 use chefshat_record::convert::{
     FieldProblem, rules_from_proto, rules_to_proto, script_to_proto, situation_from_proto,
 };
 use chefshat_search::{
-    Allocation, Chance, Estimate, Evaluation, Knowledge, KnowledgeError, Method, OwnTime,
+    Allocation, Belief, Chance, Estimate, Evaluation, Knowledge, KnowledgeError, Method, OwnTime,
     RolloutPolicy, Sampler, ShiftHistory, Worth, choose, likely_hands, outcomes, play_on,
 };
 use chefshat_simulation::vector::SavedGame;
@@ -151,6 +151,29 @@ impl Position {
         Ok(PyArray1::from_vec(py, hands.concat()))
     }
 
+    /// The natural logarithm of the likelihood of what the others did, for each of these deals.
+    /// `policy`: what says how likely they decide, `trained` or the bytes of a network file.
+    fn log_likelihoods<'py>(
+        &self,
+        py: Python<'py>,
+        deals: u64,
+        seed: u64,
+        policy: Policy,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let rules = self.rule_set();
+        let belief = match rollout_policy(policy, rules).map_err(|error| refused(py, error))? {
+            RolloutPolicy::Kind(AgentKind::Trained) => Belief::of(Network::trained(), rules),
+            RolloutPolicy::Kind(_) => None,
+            RolloutPolicy::Network(network) => Belief::of(&network, rules),
+        };
+        let words = "only a network for these rules says how likely actions are: trained or a file";
+        let belief = belief.ok_or_else(|| refused(py, field("agent", words)))?;
+        let logs = in_chunks(py, deals, |part| {
+            belief.log_likelihoods(&self.sampler, bytes(seed), part)
+        })?;
+        Ok(PyArray1::from_vec(py, logs))
+    }
+
     /// Estimates what actions are worth. `policy`: the name of a built-in agent, or the bytes of a
     /// network file. `rollouts` and `time_ms`: 0 for no limit; one of them has to be set. The other
     /// agents' random choices and the deals follow from the seed.
@@ -175,6 +198,7 @@ impl Position {
                 true => Allocation::Halving,
                 false => Allocation::Uniform,
             },
+            belief: None,
         };
         let actions = self.legal(actions).map_err(|error| refused(py, error))?;
         let interrupts = Interrupts::new();
@@ -211,13 +235,17 @@ impl Position {
         threads: usize,
         seed: u64,
     ) -> PyResult<Shifts<'py>> {
-        let policy = rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?;
+        let method = Method {
+            policy: rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?,
+            allocation: Allocation::Uniform,
+            belief: None,
+        };
         let actions = self.legal(actions).map_err(|error| refused(py, error))?;
         let pool = pool(threads);
         let worths = in_chunks(py, deals, |part| {
             let part = first + part.start..first + part.end;
             let (sampler, pool) = (&self.sampler, pool.as_deref());
-            outcomes(sampler, &actions, &policy, bytes(seed), part, pool).concat()
+            outcomes(sampler, &actions, &method, bytes(seed), part, pool).concat()
         })?;
         Ok(shifts(py, &worths))
     }

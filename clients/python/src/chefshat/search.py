@@ -161,6 +161,26 @@ class Position:
         hands = self._native.expected_hands(_checked(deals), _seed(seed))
         return hands.reshape(self.rules.players, self.rules.faces + 1)
 
+    def log_likelihoods(self, deals: int, agent: Agent = "trained", seed: int = 0) -> NDArray[np.float64]:
+        """Says how likely the other seats would have decided as they did in this Shift, for each of these deals.
+
+        The exponentials are `weights` of `evaluate`: `np.exp(t * (logs - logs.max()))`, where a t below 1 believes less.
+
+        Args:
+            deals: D: those that `sample(deals, seed)` draws.
+            agent: the others decide about as "trained" or the network of this path does: with the probabilities of its softmax, of
+                which 1 % is an error that makes any action possible.
+            seed: of the deals.
+
+        Returns:
+            (D,) natural logarithms, 0 or less; 0 if no other seat had a choice.
+
+        Raises:
+            ChefsHatError: ANALYSIS_REFUSED if the agent is no network for these rules.
+        """
+        with _engine():
+            return self._native.log_likelihoods(_checked(deals), _seed(seed), _policy(agent))
+
     def evaluate(
         self,
         rollouts: int | None = None,

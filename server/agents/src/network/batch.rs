@@ -78,35 +78,49 @@ impl Network {
     /// Calls `decided` with the place in the batch, from 0, and the action of each decision that
     /// waits. Empties the batch.
     pub fn decide_all(&self, batch: &mut NetworkBatch, mut decided: impl FnMut(usize, ActionId)) {
+        let mut best = std::mem::take(&mut batch.best);
+        best.clear();
+        best.extend(batch.legal.iter().map(|legal| {
+            let first = legal.nth(0).expect("a decision has a legal action");
+            (first, f32::NEG_INFINITY)
+        }));
+        // Before tanh, which keeps the order but differs between platforms and saturates. NaN
+        // compares as not greater.
+        self.outputs_of_all(batch, |decision, action, sum| {
+            let best = &mut best[decision];
+            if sum > best.1 {
+                *best = (action, sum);
+            }
+        });
+        for (decision, (action, _)) in best.iter().enumerate() {
+            decided(decision, *action);
+        }
+        batch.best = best;
+    }
+
+    /// Calls `found` with the place in the batch, from 0, each legal action of the decision that waits
+    /// there, and its output before tanh. Empties the batch.
+    pub fn outputs_of_all(
+        &self,
+        batch: &mut NetworkBatch,
+        mut found: impl FnMut(usize, ActionId, f32),
+    ) {
         let NetworkBatch {
             inputs,
             legal,
             hidden,
             values,
-            best,
+            ..
         } = &mut *batch;
         let length = self.last_hidden(inputs, hidden, values);
-        best.clear();
-        best.extend(legal.iter().map(|legal| {
-            let first = legal.nth(0).expect("a decision has a legal action");
-            (first, f32::NEG_INFINITY)
-        }));
         let wanted = legal.iter().map(|legal| {
             let actions = legal.iter();
             actions.map(|action| usize::from(action.index()))
         });
-        // Before tanh, which keeps the order but differs between platforms and saturates. NaN
-        // compares as not greater.
         self.output
             .for_each(values, length, wanted, |decision, index, sum| {
-                let best = &mut best[decision];
-                if sum > best.1 {
-                    *best = (ActionId::new(index as u16), sum);
-                }
+                found(decision, ActionId::new(index as u16), sum);
             });
-        for (decision, (action, _)) in best.iter().enumerate() {
-            decided(decision, *action);
-        }
         batch.clear();
     }
 

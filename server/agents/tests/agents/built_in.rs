@@ -204,6 +204,16 @@ fn agents_that_search_are_named_with_their_budget() {
     check("monte_carlo:20ms", Some("monte_carlo:20ms"));
     check("monte_carlo:300:trained", Some("monte_carlo:300"));
     check("monte_carlo:300:random", Some("monte_carlo:300:random"));
+    check("monte_carlo:belief", Some("monte_carlo:50ms:belief"));
+    check("monte_carlo:300:belief", Some("monte_carlo:300:belief"));
+    check(
+        "monte_carlo:300:trained:belief",
+        Some("monte_carlo:300:belief"),
+    );
+    check(
+        "monte_carlo:9:greedy:belief",
+        Some("monte_carlo:9:greedy:belief"),
+    );
     for wrong in [
         "",
         "greedy:50ms",
@@ -213,6 +223,10 @@ fn agents_that_search_are_named_with_their_budget() {
         "monte_carlo:61000ms",
         "monte_carlo:5:random_unmasked",
         "monte_carlo:5:greedy:",
+        "monte_carlo:5:belief:greedy",
+        "monte_carlo::belief",
+        "monte_carlobelief",
+        "belief",
     ] {
         check(wrong, None);
     }

@@ -374,6 +374,7 @@ fn plan(message: &v1::EvaluateRequest) -> Result<Plan, Status> {
         method: Method {
             policy,
             allocation: Allocation::Uniform,
+            belief: None,
         },
         rollouts: match message.rollouts {
             0 => MAX_ANALYSIS_ROLLOUTS,

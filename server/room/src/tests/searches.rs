@@ -12,6 +12,7 @@ use crate::{
 const SEARCHER: Fill = Fill::BuiltIn(NamedAgent::MonteCarlo(MonteCarlo {
     budget: Budget::Rollouts(1),
     rollouts: AgentKind::Trained,
+    belief: false,
     prior: AgentKind::Trained,
 }));
 

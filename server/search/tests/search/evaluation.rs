@@ -7,12 +7,13 @@ use chefshat_search::{
     likely_hands, outcomes, play_on, rollouts,
 };
 
-use crate::scenario::{Moment, Scenario};
+use crate::scenario::{Moment, Scenario, busiest};
 
 const MAX_STEPS: u64 = 10_000_000;
 const METHOD: Method = Method {
     policy: RolloutPolicy::Kind(AgentKind::Greedy),
     allocation: Allocation::Uniform,
+    belief: None,
 };
 
 fn rules(faces: u8, players: u8) -> RuleSet {
@@ -223,13 +224,6 @@ fn likely_hands_add_up_to_the_hidden_cards() {
     assert_eq!(hands[scenario.moments[moment].seat.index()], own);
 }
 
-/// The turn with the most legal actions.
-fn busiest(scenario: &Scenario) -> usize {
-    (0..scenario.moments.len())
-        .max_by_key(|&moment| scenario.legal(moment).len())
-        .expect("a decision")
-}
-
 fn agent(rules: &RuleSet) -> BuiltInAgent {
     let plays = MonteCarlo {
         budget: Budget::Rollouts(200),
@@ -308,7 +302,7 @@ fn outcomes_are_those_of_an_evaluation() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build();
     let pool = pool.expect("threads start");
     let seed = [5; 32];
-    let found = |deals, pool| outcomes(&sampler, &legal, &METHOD.policy, seed, deals, pool);
+    let found = |deals, pool| outcomes(&sampler, &legal, &METHOD, seed, deals, pool);
     let four = found(0..4, None);
     assert_eq!(four, found(0..4, Some(&pool)));
     assert_eq!(four[2..], found(2..4, None));

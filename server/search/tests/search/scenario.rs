@@ -138,3 +138,10 @@ impl Scenario {
         Knowledge::new(self.rules, &moment.observation, &moment.history).expect("a decision")
     }
 }
+
+/// The turn with the most legal actions.
+pub(crate) fn busiest(scenario: &Scenario) -> usize {
+    (0..scenario.moments.len())
+        .max_by_key(|&moment| scenario.legal(moment).len())
+        .expect("a decision")
+}
