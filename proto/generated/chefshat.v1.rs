@@ -48,10 +48,11 @@ pub mod rule_set {
     /// When the game ends.
     #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Oneof)]
     pub enum Stop {
-        /// The game ends after the Shift in which a seat reaches this many points, >= 1.
+        /// The game ends after the Shift in which a seat reaches this many points, >= 1; in a room at
+        /// most 1000 (limit max_shifts of GetServerInfo).
         #[prost(uint32, tag = "5")]
         TargetPoints(u32),
-        /// The game ends after this many Shifts, >= 1.
+        /// The game ends after this many Shifts, >= 1; in a room at most 1000.
         #[prost(uint32, tag = "6")]
         TargetShifts(u32),
     }
@@ -396,8 +397,8 @@ pub struct RoomPolicy {
     /// the tournament and all its games.
     #[prost(enumeration = "Visibility", tag = "16")]
     pub visibility: i32,
-    /// Whether seats may ask for hints (AskHint); by default not. Not at physical tables. A game in
-    /// which one was given is not rated.
+    /// Whether seats may ask for hints (AskHint); by default not. Not at physical tables. For the
+    /// leaderboard, a participant who was given one has lost the game.
     #[prost(bool, tag = "17")]
     pub hints: bool,
     /// The absence time: milliseconds that the game waits, at each decision, for a seat that is not
@@ -527,7 +528,7 @@ pub struct Room {
     /// The rule set, every field set.
     #[prost(message, optional, tag = "5")]
     pub rules: ::core::option::Option<RuleSet>,
-    /// The policy, every field set.
+    /// The policy, with its defaults (RoomPolicy says which fields may be unset).
     #[prost(message, optional, tag = "6")]
     pub policy: ::core::option::Option<RoomPolicy>,
     /// The seats, index = seat.
@@ -1879,7 +1880,8 @@ pub mod admin_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Deletes finished games with their records, oldest first, and gives their disk space back. Never
-        /// the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+        /// the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+        /// (STORE_FAILED).
         pub async fn prune_records(
             &mut self,
             request: impl tonic::IntoRequest<super::PruneRecordsRequest>,
@@ -2027,7 +2029,8 @@ pub mod admin_service_server {
             tonic::Status,
         >> + std::marker::Send;
         /// Deletes finished games with their records, oldest first, and gives their disk space back. Never
-        /// the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+        /// the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+        /// (STORE_FAILED).
         fn prune_records(
             &self,
             request: tonic::Request<super::PruneRecordsRequest>,
@@ -3270,7 +3273,7 @@ pub struct GameStarted {
     /// Version of the rules.
     #[prost(uint32, tag = "3")]
     pub rules_version: u32,
-    /// The policy of the room, every field set.
+    /// The policy of the room, as in Room.policy.
     #[prost(message, optional, tag = "4")]
     pub policy: ::core::option::Option<RoomPolicy>,
     /// The seats, index = seat. In the event: as the game began, all connected. In a Snapshot: as they
@@ -6297,9 +6300,9 @@ pub mod record_service_client {
         }
         /// Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
         /// it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-        /// (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-        /// (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-        /// --allow-import.
+        /// (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+        /// DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+        /// the server was started with --allow-import.
         pub async fn import_record(
             &mut self,
             request: impl tonic::IntoStreamingRequest<
@@ -6387,9 +6390,9 @@ pub mod record_service_server {
         >> + std::marker::Send;
         /// Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
         /// it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-        /// (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-        /// (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-        /// --allow-import.
+        /// (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+        /// DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+        /// the server was started with --allow-import.
         fn import_record(
             &self,
             request: tonic::Request<tonic::Streaming<super::ImportRecordRequest>>,
@@ -7030,8 +7033,8 @@ pub mod room_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-        /// room without a secret of it (`Visibility`); PERMISSION_DENIED
-        /// (JOIN_CODE_WRONG).
+        /// room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+        /// RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
         pub async fn get_room(
             &mut self,
             request: impl tonic::IntoRequest<super::GetRoomRequest>,
@@ -7086,10 +7089,10 @@ pub mod room_service_client {
         }
         /// Takes a seat and returns its ticket. One client may take several seats with one join code,
         /// unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-        /// RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-        /// KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-        /// NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN).
+        /// RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+        /// (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+        /// (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+        /// UNAVAILABLE (SHUTTING_DOWN).
         pub async fn join_room(
             &mut self,
             request: impl tonic::IntoRequest<super::JoinRoomRequest>,
@@ -7225,8 +7228,8 @@ pub mod room_service_server {
             tonic::Status,
         >> + std::marker::Send;
         /// One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-        /// room without a secret of it (`Visibility`); PERMISSION_DENIED
-        /// (JOIN_CODE_WRONG).
+        /// room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+        /// RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
         fn get_room(
             &self,
             request: tonic::Request<super::GetRoomRequest>,
@@ -7244,10 +7247,10 @@ pub mod room_service_server {
         >> + std::marker::Send;
         /// Takes a seat and returns its ticket. One client may take several seats with one join code,
         /// unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-        /// RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-        /// KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-        /// NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN).
+        /// RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+        /// (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+        /// (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+        /// UNAVAILABLE (SHUTTING_DOWN).
         fn join_room(
             &self,
             request: tonic::Request<super::JoinRoomRequest>,
@@ -7756,7 +7759,7 @@ pub struct GetServerInfoResponse {
     #[prost(string, tag = "8")]
     pub signing_key: ::prost::alloc::string::String,
     /// Those built-in agents that need no search: batches of games (VectorService), the rollouts of
-    /// analyses and tables with real cards take only these.
+    /// analyses and tables with real cards take only these. Rollouts do not take "random_unmasked".
     #[prost(string, repeated, tag = "9")]
     pub quick_built_in_agents: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
 }
@@ -9113,7 +9116,7 @@ pub struct StudySettings {
     /// closed. The server deletes it with all its data, as DeleteStudy with `force`, one to two hours
     /// later: it checks for an hour that this time has passed, so that a wrong clock deletes nothing. In
     /// the future when the study is created, before the year 10000, and not before `closes_at_ms`; 0:
-    /// when its owner deletes it. Participants are told this date with what they consent to.
+    /// when its owner deletes it. Participants see this date with the consent text.
     #[prost(uint64, tag = "16")]
     pub deletes_at_ms: u64,
     /// Participants who play together; unset: everybody plays its own games.
@@ -14274,10 +14277,10 @@ pub mod tournament_service_client {
         }
         /// Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         /// participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        /// (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        /// of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-        /// NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN).
+        /// (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+        /// NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        /// (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+        /// (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn join_tournament(
             &mut self,
             request: impl tonic::IntoRequest<super::JoinTournamentRequest>,
@@ -14823,10 +14826,10 @@ pub mod tournament_service_server {
         >> + std::marker::Send;
         /// Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         /// participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        /// (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        /// of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-        /// NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN).
+        /// (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+        /// NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        /// (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+        /// (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         fn join_tournament(
             &self,
             request: tonic::Request<super::JoinTournamentRequest>,

@@ -122,7 +122,8 @@ class AdminServiceServicer(object):
 
     def PruneRecords(self, request, context):
         """Deletes finished games with their records, oldest first, and gives their disk space back. Never
-        the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+        the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+        (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

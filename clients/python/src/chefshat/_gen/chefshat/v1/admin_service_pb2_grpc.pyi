@@ -51,7 +51,8 @@ class AdminServiceStub:
     """Returns how much is stored."""
     PruneRecords: _grpc.UnaryUnaryMultiCallable[_admin_service_pb2.PruneRecordsRequest, _admin_service_pb2.PruneRecordsResponse]
     """Deletes finished games with their records, oldest first, and gives their disk space back. Never
-    the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+    the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+    (STORE_FAILED).
     """
     ExportParticipant: _grpc.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]
     """Streams all that is stored under a participant's name: its games that are over with its
@@ -94,7 +95,8 @@ class AdminServiceAsyncStub(AdminServiceStub):
     """Returns how much is stored."""
     PruneRecords: _aio.UnaryUnaryMultiCallable[_admin_service_pb2.PruneRecordsRequest, _admin_service_pb2.PruneRecordsResponse]  # type: ignore[assignment]
     """Deletes finished games with their records, oldest first, and gives their disk space back. Never
-    the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+    the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+    (STORE_FAILED).
     """
     ExportParticipant: _aio.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]  # type: ignore[assignment]
     """Streams all that is stored under a participant's name: its games that are over with its
@@ -170,7 +172,8 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_admin_service_pb2.PruneRecordsResponse, _abc.Awaitable[_admin_service_pb2.PruneRecordsResponse]]:
         """Deletes finished games with their records, oldest first, and gives their disk space back. Never
-        the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
+        the newest game, games of studies, or games of tournaments that are not over. UNAVAILABLE
+        (STORE_FAILED).
         """
 
     @_abc_1.abstractmethod

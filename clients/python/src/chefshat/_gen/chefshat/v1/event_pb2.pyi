@@ -459,7 +459,7 @@ class GameStarted(_message.Message):
 
     @_builtins.property
     def policy(self) -> _room_pb2.RoomPolicy:
-        """The policy of the room, every field set."""
+        """The policy of the room, as in Room.policy."""
 
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Participant]:

@@ -96,9 +96,9 @@ class RecordServiceServicer(object):
     def ImportRecord(self, request_iterator, context):
         """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
         it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-        (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-        --allow-import.
+        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+        the server was started with --allow-import.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -56,9 +56,9 @@ class RecordServiceStub:
     ImportRecord: _grpc.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]
     """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
     it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-    (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-    --allow-import.
+    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+    the server was started with --allow-import.
     """
 
 @_typing.type_check_only
@@ -89,9 +89,9 @@ class RecordServiceAsyncStub(RecordServiceStub):
     ImportRecord: _aio.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]  # type: ignore[assignment]
     """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
     it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-    (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-    --allow-import.
+    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+    the server was started with --allow-import.
     """
 
 class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -143,9 +143,9 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_record_service_pb2.ImportRecordResponse, _abc.Awaitable[_record_service_pb2.ImportRecordResponse]]:
         """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
         it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
-        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
-        (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
-        --allow-import.
+        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE above 64 MiB or 1,500,000 lines,
+        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless
+        the server was started with --allow-import.
         """
 
 def add_RecordServiceServicer_to_server(servicer: RecordServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

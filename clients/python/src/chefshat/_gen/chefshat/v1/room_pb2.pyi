@@ -519,8 +519,8 @@ class RoomPolicy(_message.Message):
     the tournament and all its games.
     """
     hints: _builtins.bool
-    """Whether seats may ask for hints (AskHint); by default not. Not at physical tables. A game in
-    which one was given is not rated.
+    """Whether seats may ask for hints (AskHint); by default not. Not at physical tables. For the
+    leaderboard, a participant who was given one has lost the game.
     """
     absence_time_ms: _builtins.int
     """The absence time: milliseconds that the game waits, at each decision, for a seat that is not
@@ -859,7 +859,7 @@ class Room(_message.Message):
 
     @_builtins.property
     def policy(self) -> Global___RoomPolicy:
-        """The policy, every field set."""
+        """The policy, with its defaults (RoomPolicy says which fields may be unset)."""
 
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[Global___Participant]:

@@ -89,8 +89,8 @@ class RoomServiceServicer(object):
 
     def GetRoom(self, request, context):
         """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-        room without a secret of it (`Visibility`); PERMISSION_DENIED
-        (JOIN_CODE_WRONG).
+        room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+        RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -109,10 +109,10 @@ class RoomServiceServicer(object):
     def JoinRoom(self, request, context):
         """Takes a seat and returns its ticket. One client may take several seats with one join code,
         unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-        RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-        KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-        NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN).
+        RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+        (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+        (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -42,8 +42,8 @@ class RoomServiceStub:
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
     """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-    room without a secret of it (`Visibility`); PERMISSION_DENIED
-    (JOIN_CODE_WRONG).
+    room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+    RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
     """
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
@@ -54,10 +54,10 @@ class RoomServiceStub:
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
     unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-    KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-    NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN).
+    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+    (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+    (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     LeaveRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
@@ -91,8 +91,8 @@ class RoomServiceAsyncStub(RoomServiceStub):
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
     """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-    room without a secret of it (`Visibility`); PERMISSION_DENIED
-    (JOIN_CODE_WRONG).
+    room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+    RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
     """
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
     """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
@@ -103,10 +103,10 @@ class RoomServiceAsyncStub(RoomServiceStub):
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and returns its ticket. One client may take several seats with one join code,
     unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-    KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-    NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN).
+    RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+    (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+    (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     LeaveRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]  # type: ignore[assignment]
     """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
@@ -149,8 +149,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.GetRoomResponse, _abc.Awaitable[_room_service_pb2.GetRoomResponse]]:
         """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
-        room without a secret of it (`Visibility`); PERMISSION_DENIED
-        (JOIN_CODE_WRONG).
+        room without a secret of it (`Visibility`); PERMISSION_DENIED (JOIN_CODE_WRONG);
+        RESOURCE_EXHAUSTED (TOO_MANY_WRONG_CODES).
         """
 
     @_abc_1.abstractmethod
@@ -173,10 +173,10 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.JoinRoomResponse, _abc.Awaitable[_room_service_pb2.JoinRoomResponse]]:
         """Takes a seat and returns its ticket. One client may take several seats with one join code,
         unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
-        RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
-        KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
-        NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN).
+        RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION
+        (SEAT_TAKEN, KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT
+        (NO_SUCH_SEAT, NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod

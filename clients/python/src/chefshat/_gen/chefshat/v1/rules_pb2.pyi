@@ -162,9 +162,11 @@ class RuleSet(_message.Message):
     jokers: _builtins.int
     """Number of jokers, 0..=2."""
     target_points: _builtins.int
-    """The game ends after the Shift in which a seat reaches this many points, >= 1."""
+    """The game ends after the Shift in which a seat reaches this many points, >= 1; in a room at
+    most 1000 (limit max_shifts of GetServerInfo).
+    """
     target_shifts: _builtins.int
-    """The game ends after this many Shifts, >= 1."""
+    """The game ends after this many Shifts, >= 1; in a room at most 1000."""
     exchange: _builtins.bool
     """Whether cards are exchanged, from the second Shift on."""
     special_actions: _builtins.bool

@@ -100,7 +100,7 @@ class GetServerInfoResponse(_message.Message):
     @_builtins.property
     def quick_built_in_agents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Those built-in agents that need no search: batches of games (VectorService), the rollouts of
-        analyses and tables with real cards take only these.
+        analyses and tables with real cards take only these. Rollouts do not take "random_unmasked".
         """
 
     def __init__(

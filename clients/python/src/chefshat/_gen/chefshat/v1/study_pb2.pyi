@@ -1287,7 +1287,7 @@ class StudySettings(_message.Message):
     closed. The server deletes it with all its data, as DeleteStudy with `force`, one to two hours
     later: it checks for an hour that this time has passed, so that a wrong clock deletes nothing. In
     the future when the study is created, before the year 10000, and not before `closes_at_ms`; 0:
-    when its owner deletes it. Participants are told this date with what they consent to.
+    when its owner deletes it. Participants see this date with the consent text.
     """
     @_builtins.property
     def factors(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyFactor]:

@@ -179,10 +179,10 @@ class TournamentServiceServicer(object):
     def JoinTournament(self, request, context):
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-        NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN).
+        (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+        NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -59,10 +59,10 @@ class TournamentServiceStub:
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-    NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN).
+    (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+    NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+    (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
@@ -194,10 +194,10 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-    NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN).
+    (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+    NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+    (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
@@ -350,10 +350,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.JoinTournamentResponse, _abc.Awaitable[_tournament_service_pb2.JoinTournamentResponse]]:
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
-        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
-        NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN).
+        (TOURNAMENT_FULL, TOO_MANY_WRONG_CODES); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
+        NAME_RESERVED for names of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT
+        (NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
