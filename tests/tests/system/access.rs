@@ -1,6 +1,7 @@
 //! Tokens, roles and scopes over real sockets. The role matrix is asked of a running server and
 //! must be the table in docs/access.md.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -243,15 +244,17 @@ async fn every_call_has_the_role_that_the_documentation_says() {
         .filter(|it| it.path.starts_with(PACKAGE))
         .collect();
     calls.sort_by_key(|call| call.path);
-    let mut table = String::from("\n| call |");
+    let mut table = String::from("\n| calls |");
     callers
         .iter()
         .for_each(|(name, _)| table += &format!(" {name} |"));
     table += "\n|---|";
     callers.iter().for_each(|_| table += "---|");
     table += "\n";
+    // The calls that answer all callers alike are a row.
+    let mut rows: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for call in calls {
-        table += &format!("| `{}` |", call.path.trim_start_matches(PACKAGE));
+        let mut cells = String::new();
         for (name, token) in &callers {
             let refusal = guarded.refusal(call.path, token.as_deref()).await;
             let cell = match refusal {
@@ -261,9 +264,13 @@ async fn every_call_has_the_role_that_the_documentation_says() {
                 }
                 None => "yes".to_owned(),
             };
-            table += &format!(" {cell} |");
+            cells += &format!(" {cell} |");
         }
-        table += "\n";
+        let name = format!("`{}`", call.path.trim_start_matches(PACKAGE));
+        rows.entry(cells).or_default().push(name);
+    }
+    for (cells, names) in rows {
+        table += &format!("| {} |{cells}\n", names.join(", "));
     }
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/access.md");
     let page = std::fs::read_to_string(page).expect("the page");
