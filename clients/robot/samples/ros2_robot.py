@@ -4,7 +4,7 @@ Build `chefshat_msgs` in the robot's workspace, start `zenoh-bridge-ros2dds -l t
 
     python ros2_robot.py --ros-args -p seat:=1 -p distance:=0.3 -p table:=0.7
 
-and `chefshat-robot robot --driver ros2:connect=tcp/ROBOT:7447 --room JOINCODE` anywhere. `distance` is from the edge of the field
+and `chefshat-robot robot --driver ros2:connect=tcp/ROBOT:7447 --code JOIN-CODE` anywhere. `distance` is from the edge of the field
 to `base_link`, which faces its middle, and `table` the height of the table above it, in m. Where a robot stands differently, give
 `-p publish:=false` and publish your own transform from `base_link` to `chefshat_field`. In place of the logs, let your robot move.
 """

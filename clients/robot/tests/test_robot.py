@@ -172,7 +172,7 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
             ]
 
     key = ["--name", "Keyed", "--name-key", str(tmp_path / "robot.key")]
-    arguments = ["--address", server_address, "--room", run(code()), "--seed", "3", "--json", "--language", "it", *key]
+    arguments = ["--address", server_address, "--code", run(code()), "--seed", "3", "--json", "--language", "it", *key]
     driver = f"simulated:frames={tmp_path / 'frames'},speed=0,clumsy=true"
     assert cli.main(["robot", *arguments, "--driver", driver]) == 0
     out, err = capsys.readouterr()
@@ -190,12 +190,12 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--room", "X", "--ticket", "Y"], "give the room's join code (--room), or the ticket"),
-        ([], "give the room's join code (--room), or the ticket"),
-        (["--room", "X", "--agent", "nonsense"], "--agent nonsense: give 'random' or module:Class"),
-        (["--room", "X", "--agent", "missing.safetensors"], "--agent missing.safetensors"),
-        (["--room", "X", "--address", "127.0.0.1:1"], "no server answers"),
-        (["--room", "X", "--name-key", "."], "--name-key: "),
+        (["--code", "X", "--ticket", "Y"], "give the room's join code (--code), or the ticket"),
+        ([], "give the room's join code (--code), or the ticket"),
+        (["--code", "X", "--agent", "nonsense"], "--agent nonsense: give 'random' or module:Class"),
+        (["--code", "X", "--agent", "missing.safetensors"], "--agent missing.safetensors"),
+        (["--code", "X", "--address", "127.0.0.1:1"], "no server answers"),
+        (["--code", "X", "--name-key", "."], "--name-key: "),
     ],
 )
 def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -226,7 +226,7 @@ def test_a_robot_that_is_not_there_at_the_start_is_an_error(server_address: str,
         async with aio.Client(server_address) as client:
             return await room(client)
 
-    arguments = ["--address", server_address, "--room", run(code()), "--driver", "jsonlines:port=1"]
+    arguments = ["--address", server_address, "--code", run(code()), "--driver", "jsonlines:port=1"]
     assert cli.main(["robot", *arguments]) == 1
     err = capsys.readouterr().err
     assert "no robot listens at 127.0.0.1:1" in err

@@ -46,9 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of the subcommand."""
     parser.description = DESCRIPTION
     add_robot_arguments(parser)
-    parser.add_argument("--room", "--code", dest="room", metavar="CODE", help="the room's join code")
+    parser.add_argument("--code", "--room", dest="room", metavar="CODE", help="the room's join code")
     parser.add_argument(
-        "--ticket", help=f"resume a seat with its ticket, instead of --room; also from the environment variable {TICKET}"
+        "--ticket", help=f"resume a seat with its ticket, instead of --code; also from the environment variable {TICKET}"
     )
     parser.add_argument("--seat", type=int, help="the seat, from 0 (default: the first free one)")
     parser.add_argument("--name", default="Robot", help="the robot's name, 1 to 64 characters (default: %(default)s)")
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     async def play() -> int:
         if bool(ticket) == bool(arguments.room):
-            raise CommandError("give the room's join code (--room), or the ticket of a seat to resume (--ticket)")
+            raise CommandError("give the room's join code (--code), or the ticket of a seat to resume (--ticket)")
         agent = _agent(arguments.agent, arguments.seed)
         driver = drivers.create(arguments.driver)
         async with driver:
