@@ -323,7 +323,7 @@ test("the key of a person's names is taken to another device", async () => {
   const keyField = async (page: Page) => {
     await page.goto(server.url);
     await page.getByRole("button", { name: "Settings" }).click();
-    return page.getByLabel("Key of your names");
+    return page.getByLabel("Your identity key");
   };
   const own = await sit(first);
   expect(own).toMatch(/^[0-9a-f]{16}$/);

@@ -48,8 +48,8 @@ export const common: Texts["common"] = {
         "Dein Browser erlaubt dieser Seite keine Benachrichtigungen. Das kannst du in den Einstellungen des Browsers ändern.",
     },
     names: {
-      key: "Schlüssel deiner Namen",
-      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Bestenlisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
+      key: "Dein Identitätsschlüssel",
+      hint: "Andere können deinen Namen wählen, haben aber deinen Schlüssel nicht: Bestenlisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
       notAKey: "Ein Schlüssel hat 64 Ziffern von 0 bis 9 und a bis f.",
       use: "Diesen Schlüssel verwenden",
       replaces:

@@ -46,8 +46,8 @@ export const common = {
         "Your browser does not allow notifications from this page. You can change that in the browser’s settings.",
     },
     names: {
-      key: "Key of your names",
-      hint: "Others can choose your name, but they do not have its key, so leaderboards list you separately. The key is created when you first join a game. Enter it on another device to be the same person there, and show it to nobody else.",
+      key: "Your identity key",
+      hint: "Others can choose your name, but they do not have your key, so leaderboards list you separately. The key is created when you first join a game. Enter it on another device to be the same person there, and show it to nobody else.",
       notAKey: "A key has 64 digits from 0 to 9 and a to f.",
       use: "Use this key",
       replaces:

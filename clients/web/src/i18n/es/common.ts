@@ -49,8 +49,8 @@ export const common: Texts["common"] = {
         "Tu navegador no permite las notificaciones de esta página. Puedes cambiarlo en los ajustes del navegador.",
     },
     names: {
-      key: "Clave de tus nombres",
-      hint: "Otras personas pueden elegir tu nombre, pero no su clave: las clasificaciones os muestran por separado. La clave se crea cuando entras por primera vez en una partida. Para ser la misma persona en otro dispositivo, escríbela allí; no se la digas a nadie más.",
+      key: "Tu clave de identidad",
+      hint: "Otras personas pueden elegir tu nombre, pero no tienen tu clave: las clasificaciones os muestran por separado. La clave se crea cuando entras por primera vez en una partida. Para ser la misma persona en otro dispositivo, escríbela allí; no se la digas a nadie más.",
       notAKey: "Una clave tiene 64 cifras de 0 a 9 y de a a f.",
       use: "Usar esta clave",
       replaces:

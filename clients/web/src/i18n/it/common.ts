@@ -46,8 +46,8 @@ export const common: Texts["common"] = {
       notAllowed: "Il browser non permette le notifiche di questa pagina. Puoi cambiarlo nelle sue impostazioni.",
     },
     names: {
-      key: "Chiave dei tuoi nomi",
-      hint: "Altri possono scegliere il tuo nome, ma non la sua chiave: le classifiche vi elencano separati. La chiave si crea quando entri per la prima volta in una partita. Per essere la stessa persona su un altro dispositivo, inseriscila lì; non dirla a nessun altro.",
+      key: "La tua chiave d’identità",
+      hint: "Altri possono scegliere il tuo nome, ma non hanno la tua chiave: le classifiche vi elencano separati. La chiave si crea quando entri per la prima volta in una partita. Per essere la stessa persona su un altro dispositivo, inseriscila lì; non dirla a nessun altro.",
       notAKey: "Una chiave ha 64 cifre da 0 a 9 e da a a f.",
       use: "Usa questa chiave",
       replaces:
