@@ -286,9 +286,9 @@ fn of_each() -> String {
             ),
         ),
         (
-            "wrong join codes (the code of a tournament is none, also where a room is asked for)",
+            "wrong join codes",
             format!(
-                "{}, networks of IPv6 in one /48 together; beyond {} of all clients, who has just sent one is refused",
+                "{} (an IPv6 /48 counts as one client). Above {} from all clients together, a client that has just sent a wrong code is refused. A tournament's code does not count as wrong where a room's is asked for",
                 rate(calls::WRONG_CODES_PER_SECOND, calls::WRONG_CODES_AT_ONCE),
                 rate(
                     calls::ALL_WRONG_CODES_PER_SECOND,

@@ -15,11 +15,11 @@ const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "p
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Times and limits")]
 pub(super) struct PolicyArgs {
-    /// Milliseconds for each decision. Default: 10000, for people 60000.
+    /// Milliseconds for each decision. Default: 10000, for people and language models 60000.
     #[arg(long, value_name = "MS")]
     decision_time_ms: Option<u32>,
-    /// Time bank of each seat for the whole game, in milliseconds. Default: 60000, for people
-    /// 300000.
+    /// Time bank of each seat for the whole game, in milliseconds. Default: 60000, for people and
+    /// language models 300000.
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
     /// Absence time: milliseconds that the game waits, at each decision, for a seat that is not
@@ -29,7 +29,8 @@ pub(super) struct PolicyArgs {
     absence_time_ms: Option<u32>,
     /// Times for one kind of participant: milliseconds per decision and, after further colons, the
     /// time bank and the absence time, for example human:60000 or robot:30000:120000:5000.
-    /// Repeatable. People have their default times unless --decision-time-ms or --bank-ms is given.
+    /// Repeatable. People and language models have their default times unless --decision-time-ms or
+    /// --bank-ms is given.
     #[arg(long = "clock", value_name = "KIND:MS[:MS[:MS]]", value_parser = clock)]
     clocks: Vec<v1::KindClock>,
     /// Invalid attempts at one decision before the default action is taken, 0 for no limit.

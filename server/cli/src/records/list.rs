@@ -82,9 +82,14 @@ pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
         reason => format!("  aborted: {}", abort_reason(reason)),
     };
     format!(
-        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}{why}{}",
+        "{}  {state:<8}  {:>3} {:<6}  {:>6} decisions  {}{room}{why}{}",
         clean(&summary.game_id, 32),
         summary.shifts,
+        if summary.shifts == 1 {
+            "Shift"
+        } else {
+            "Shifts"
+        },
         summary.decisions,
         players.join(", "),
         visibility_mark(summary.visibility()),
@@ -125,11 +130,12 @@ mod tests {
             game_id: "5f0c6a4de2b14b7f8a3d9c1e7b60425d".into(),
             state: v1::RoomState::Aborted.into(),
             seats: vec![seat(0, "Greta"), seat(1, "")],
+            shifts: 1,
             ..v1::RecordSummary::default()
         };
         assert_eq!(
             in_a_line(&aborted),
-            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  aborted     0 Shifts       0 decisions  Greta, seat 2"
+            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  aborted     1 Shift        0 decisions  Greta, seat 2"
         );
     }
 }
