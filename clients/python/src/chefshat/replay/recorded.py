@@ -92,7 +92,8 @@ def from_records(paths: Path | str | Sequence[Path | str], **options: Any) -> Tr
         made = Path(folder) / "dataset"
         form = "parquet" if has_pyarrow() else "jsonl"
         # A server's address is no alternative here.
-        program = find_binary("replay the records on this machine", instead="")
+        lab = ". It needs the program chefshat-lab beside it (cargo build --release -p chefshat -p chefshat-lab)"
+        program = find_binary("replay the records on this machine", instead=lab)
         command = [str(program), "export", *map(str, files), "--out", str(made), "--format", form]
         done = subprocess.run(command, capture_output=True, text=True, env=clean_environment())
         if done.returncode != 0:
