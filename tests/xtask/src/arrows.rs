@@ -12,10 +12,6 @@ use crate::places::Places;
 
 /// For each crate, the crates of the workspace that it may depend on. ARCHITECTURE.md explains the
 /// map.
-///
-/// Two arrows go beyond the map: `chefshat-tournament` depends on `chefshat-agents` (for
-/// `AgentKind`, because built-in agents are fillers), and `chefshat-simulation` on
-/// `chefshat-tournament` (it plays complete tournaments offline).
 const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-engine", &[]),
     ("chefshat-proto", &[]),
