@@ -2,7 +2,7 @@
 
 It reads the meaning of the actions from the server's table, without any rules. Start a server, then run
 `python samples/careful_agent.py 127.0.0.1:50051`, or join a room:
-`python -m chefshat.agent --address HOST:PORT --code JOINCODE --name Careful --agent samples.careful_agent:Careful`.
+`python -m chefshat.agent --address HOST:PORT --code JOIN-CODE --name Careful --agent samples.careful_agent:Careful`.
 """
 
 import re
