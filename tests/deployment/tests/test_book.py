@@ -69,9 +69,11 @@ NOT_RUN = {
     r"chefshat verify game\.jsonl --key ": "a key of the reader; server/lab/tests/cli/verify.rs",
     r"chefshat tournament table ": "needs a game at a physical table; tests/tests/system/tournament_tables.rs",
     r"chefshat-robot rehearse( --people 2 --(shifts 1 --mistakes|open)|$)": "minutes; docs/index.md has one that is run",
-    r"chefshat-robot robot --room JOINCODE --name Pepe --referee ": "needs a game at a physical table; clients/robot/tests",
+    r"chefshat-robot robot --code JOIN-CODE --name Pepe --referee ": "needs a game at a physical table; clients/robot/tests",
     r"chefshat-robot robot --address .*--driver simulated": "a simulated robot moves as slowly as a real one; clients/robot/tests",
     r"chefshat-robot table shift|chefshat-robot perceive shift": "minutes of video; clients/robot/tests has shorter ones",
+    r"chefshat serve --metrics-listen |curl http://127\.0\.0\.1:9464/": "a port that may be taken; tests/tests/system/observing.rs",
+    r"chefshat study ": "a study to its end; server/lab/tests/cli/study.rs",
     r"chefshat serve --database|chefshat migrate |create(user|db) ": "needs PostgreSQL; test_cluster.py has it",
     r"cargo run --release -p chefshat-cluster ": "a build of its own",
 }
@@ -79,7 +81,7 @@ NOT_RUN = {
 #: Commands that end with a game or tournament, while the page goes on.
 BESIDE_OTHERS = re.compile(r"chefshat tournament join |.* --tournament ")
 SERVE = re.compile(r"(chefshat|target/debug/chefshat|cargo run --) serve\b")
-CODES = re.compile(r"\b(JOINCODE|JOIN-CODE|BCDF2345)\b")
+CODE = "JOIN-CODE"
 
 
 def commands(page: str) -> list[str]:
@@ -169,8 +171,8 @@ class Reader:
             self.machine.values["P07"] = "P07"
         if "ROOM-ID" in command and "ROOM-ID" not in self.machine.values:
             self.code("")
-        if CODES.search(command):
-            command = CODES.sub(self.code(command), command)
+        if CODE in command:
+            command = command.replace(CODE, self.code(command))
         if re.match(r"chefshat-robot (rehearse|robot) (?!.*--(address|list-drivers))", command + " "):
             command += f" --address {self.machine.values['127.0.0.1:50051']}"
         if command.startswith("chefshat participant delete "):

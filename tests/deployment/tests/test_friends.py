@@ -60,7 +60,7 @@ def test_a_tournament_of_friends_is_played_as_written(machines: list[Machine]) -
     created = organiser.type(create)
     code, tournament = copied(r"join code +(\w{8})", created), copied(r"tournament +(\w{32})", created)
     for machine in (server, gustav, thea):
-        machine.values["BCDF2345"] = code
+        machine.values["JOIN-CODE"] = code
     gustavs = gustav.start(join)
     (thea.folder / "my_agent.py").write_text(program)
     # Installed already, as in all of these tests.
