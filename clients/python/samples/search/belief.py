@@ -1,8 +1,8 @@
 """How much do the decisions of others say about their hands? Compares guesses of the cards in three hidden hands with the truth.
 
-Run `python samples/search/belief.py`. A seat that plays as `trained` guesses at every third of its decisions with a choice: first as
-if all possible deals were equally likely, then with deals of which each is drawn among 8 or 64 by `Position.log_likelihoods`. The
-agent `monte_carlo:50ms:belief` draws among 8. It needs the extra `learn`.
+Run `python samples/search/belief.py`. A seat that plays as `trained` guesses at every third of its decisions with a choice: as if
+all possible deals were equally likely, and with deals of which each is drawn among 8 or 64 by `Position.log_likelihoods`. The agent
+`monte_carlo:50ms:belief` draws among 8. It needs the extra `learn`.
 """
 
 import sys

@@ -321,8 +321,9 @@ class SeatConfig(_message.Message):
     """A built-in agent of the server: "random", "random_unmasked", "greedy", "trained", or
     "monte_carlo", which searches. A budget for each decision may follow: "monte_carlo:50ms" (the
     default, at most 1000ms), "monte_carlo:400" (rollouts, at most 5000), then the agent of the
-    rollouts: "monte_carlo:400:greedy". When the server has too much to search, it plays as
-    "trained". Not at physical tables.
+    rollouts: "monte_carlo:400:greedy", then the word "belief": "monte_carlo:50ms:belief" (it guesses
+    hands from what the others did). When the server has too much to search, it plays as "trained".
+    Not at physical tables.
     """
     at_table: Global___ParticipantKind.ValueType
     """A player of this kind who sits at the physical table with real cards. Nobody connects: what
