@@ -73,10 +73,16 @@ impl RecordWriter {
     async fn write(self, game: GameId, charged: Key, data_dir: PathBuf) {
         // Before it is read: a long record takes much memory. The database has it already, so its
         // file takes nothing of what is kept for running games.
-        let _slice = loop {
+        let (_slice, _writing) = loop {
             let slice = self.background.slice(charged).await;
             if self.store.has_space() {
-                break slice;
+                if let Ok(writing) = self.writing.try_read() {
+                    break (slice, writing);
+                }
+                // A pause may take minutes, in which others compute.
+                drop(slice);
+                drop(self.writing.read().await);
+                continue;
             }
             drop(slice);
             // The first one waits for space, and the others for it.
@@ -88,7 +94,6 @@ impl RecordWriter {
                 return;
             }
         };
-        let _writing = self.writing.read().await;
         let stored = match self.store.finished(game).await {
             Ok(Some(stored)) => stored,
             Ok(None) => return,
@@ -144,5 +149,38 @@ impl RecordWriter {
             Some(Err(error)) => error!(%game, %error, "writing a record failed"),
             None => error!(%game, "writing a record failed"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::FutureExt as _;
+
+    use super::*;
+    use chefshat_admission::limits::Shares;
+    use chefshat_store::MemoryStore;
+
+    /// Deleting a participant pauses the records, and reads every file of them.
+    #[tokio::test]
+    async fn records_that_are_paused_leave_long_computations_to_others() {
+        let background = Arc::new(Background::new(Shares::ALL, 1).expect("threads"));
+        let writer = RecordWriter::new(
+            Arc::new(MemoryStore::default()),
+            Some(PathBuf::new()),
+            TaskTracker::new(),
+            Arc::clone(&background),
+        );
+        let paused = writer.pause().await;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        for _ in 0..cores {
+            writer.write_record(GameId::random(), Key::Local);
+        }
+        for _ in 0..100 {
+            tokio::task::yield_now().await;
+        }
+        assert!(background.slice(Key::Resumed).now_or_never().is_some());
+        drop(paused);
+        writer.tracker.close();
+        writer.tracker.wait().await;
     }
 }
