@@ -1,6 +1,8 @@
 //! What happens before the first turn of a Shift, and hands that become known: hands, special
 //! actions, gifts, roles.
 
+use std::sync::Arc;
+
 use chefshat_engine::{DecisionKind, Opening, Role, Seat, Viewer};
 
 use super::{Judged, Referee};
@@ -236,7 +238,7 @@ impl Referee {
 
     /// Marks a decision of a remote seat as carried out.
     pub(super) fn confirm(&mut self, shift: usize, index: usize) -> Verdict {
-        let entry = &mut self.shifts[shift].entries[index];
+        let entry = &mut Arc::make_mut(&mut self.shifts[shift]).entries[index];
         if entry.confirmed || entry.report.is_some() {
             return Verdict::Known;
         }

@@ -9,6 +9,7 @@ mod state;
 mod turns;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use chefshat_engine::{
     Action, ActionId, BySeat, Event, Game, Observation, Opening, RuleSet, Seat, Viewer,
@@ -33,7 +34,8 @@ const MAX_ANSWERS: usize = 16;
 /// The most reports that wait for an answer.
 pub const MAX_HELD: usize = 32;
 
-/// The referee of a physical table.
+/// The referee of a physical table. A clone, which a report makes to go back if it is refused, shares
+/// the Shifts.
 #[derive(Debug, Clone)]
 pub struct Referee {
     rules: RuleSet,
@@ -41,11 +43,11 @@ pub struct Referee {
     remote: BySeat<bool>,
     names: Names,
     /// The Shifts so far, the one in progress last.
-    shifts: Vec<Shift>,
+    shifts: Vec<Arc<Shift>>,
     /// The games of the Shifts.
-    played: Vec<Played>,
+    played: Vec<Arc<Played>>,
     /// Events of each Shift that were reported.
-    published: Vec<Vec<Event>>,
+    published: Vec<Arc<[Event]>>,
     /// The question of the referee, if one is open.
     asked: Option<Asked>,
     /// Number of turns of the Shift when the board was last seen to be cleared.
@@ -286,8 +288,8 @@ impl Referee {
         let shift = Shift::new(start);
         let played = play(&self.rules, &self.remote, &shift)
             .expect("a Shift of which nothing is known can be played");
-        self.shifts.push(shift);
-        self.played.push(played);
+        self.shifts.push(Arc::new(shift));
+        self.played.push(Arc::new(played));
         self.cleared = 0;
     }
 
@@ -302,8 +304,8 @@ impl Referee {
         };
         let played = play(&self.rules, &self.remote, &shift)?;
         let next = played.next.clone();
-        *self.shifts.last_mut().expect("a game has a Shift") = shift;
-        *self.played.last_mut().expect("a game has a Shift") = played;
+        *self.shifts.last_mut().expect("a game has a Shift") = Arc::new(shift);
+        *self.played.last_mut().expect("a game has a Shift") = Arc::new(played);
         if let Some(next) = next {
             self.push_shift(next);
         }
@@ -339,11 +341,11 @@ impl Referee {
             .saturating_sub(2);
         let (mut void, mut new) = (0, Vec::new());
         let played = self.played[first..].iter().map(|it| self.publishable(it));
-        let current: Vec<Vec<Event>> = played.map(<[Event]>::to_vec).collect();
+        let current: Vec<Arc<[Event]>> = played.map(Arc::from).collect();
         let former = self.published.split_off(first);
         for index in 0..current.len().max(former.len()) {
-            let old = former.get(index).map_or(&[][..], Vec::as_slice);
-            let events = current.get(index).map_or(&[][..], Vec::as_slice);
+            let old = former.get(index).map_or(&[][..], Arc::as_ref);
+            let events = current.get(index).map_or(&[][..], Arc::as_ref);
             let common = match void {
                 0 => (old.iter().zip(events))
                     .take_while(|(old, new)| public(old) == public(new))
@@ -415,5 +417,25 @@ impl Referee {
     /// Decisions of remote seats that nobody has carried out yet, oldest first.
     pub fn to_lay(&self) -> &[ToLay] {
         &self.to_lay
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_engine::RuleSetSpec;
+
+    use super::*;
+
+    /// A report costs the same in a long game: it clones the referee, but not what Shifts hold.
+    #[test]
+    fn clones_share_the_shifts() {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let names = vec!["a player".to_owned(); 4];
+        let mut referee = Referee::new(rules, BySeat::filled(4, false), names);
+        referee.start();
+        let clone = referee.clone();
+        assert!(Arc::ptr_eq(&referee.shifts[0], &clone.shifts[0]));
+        assert!(Arc::ptr_eq(&referee.played[0], &clone.played[0]));
+        assert!(Arc::ptr_eq(&referee.published[0], &clone.published[0]));
     }
 }
