@@ -59,10 +59,7 @@ impl Tournament {
     pub fn next(&mut self, now_ms: u64) -> Option<Change> {
         self.scheduler.see_time(now_ms);
         match self.state.phase {
-            State::Open => {
-                let enough = self.state.settings.start_when_joined?;
-                (self.joined() >= enough).then(|| self.beginning())?
-            }
+            State::Open => self.is_draw_due().then(|| self.beginning())?,
             State::Playing => {
                 // A void game can be called again until then.
                 if !self.state.paused {
@@ -76,6 +73,14 @@ impl Tournament {
                 self.next_game(now_ms)
             }
             State::Finished | State::Closed => None,
+        }
+    }
+
+    /// Whether [`Tournament::next`] begins the tournament or draws a round now, which takes a while.
+    pub fn is_draw_due(&self) -> bool {
+        match (self.state.phase, self.state.settings.start_when_joined) {
+            (State::Open, Some(enough)) => self.joined() >= enough,
+            _ => !self.state.paused && self.state.is_draw_due(),
         }
     }
 

@@ -5,20 +5,17 @@ use super::Tournament;
 use super::chance::Chance;
 use super::change::Change;
 use super::settings::Format;
-use super::state::{Pairings, State};
+use super::state::Pairings;
 use super::{knockout, round_robin, seats, swiss};
 
 impl Tournament {
     /// Pairs the next round, if it is due.
     pub(super) fn pairings(&mut self) -> Option<Change> {
         let state = &self.state;
-        if state.phase != State::Playing || state.drawn >= state.rounds {
+        if !state.is_draw_due() {
             return None;
         }
         let format = state.settings.format;
-        if format != Format::RoundRobin && !state.is_round_over() {
-            return None;
-        }
         let round = state.drawn + 1;
         let pairings = match format {
             Format::RoundRobin => self.planned(round)?,

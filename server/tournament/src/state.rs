@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::change::{Change, Entrant, Former, Game, GameResult, GameState};
-use super::settings::{Deals, Settings};
+use super::settings::{Deals, Format, Settings};
 
 /// The phase of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,6 +167,13 @@ impl TournamentState {
     /// Whether all games of the rounds paired so far are over.
     pub(super) fn is_round_over(&self) -> bool {
         self.over == self.games.len()
+    }
+
+    /// Whether the next round is to be drawn.
+    pub(super) fn is_draw_due(&self) -> bool {
+        self.phase == State::Playing
+            && self.drawn < self.rounds
+            && (self.settings.format == Format::RoundRobin || self.is_round_over())
     }
 
     /// Whether a participant can play one more game now.

@@ -443,26 +443,19 @@ impl TournamentTask {
             self.fold_all(begun.unwrap_or_default());
         }
         let now_ms = self.now_ms();
-        // If no game is running, a round may be due, which takes a while to draw.
-        let core = &self.unit.state.core;
-        let may_draw = match core.state() {
-            State::Open => core.settings().start_when_joined.is_some(),
-            State::Playing => core.playing().next().is_none(),
-            State::Finished | State::Closed => false,
-        };
-        if may_draw {
-            let following = move |mut core: Tournament| {
-                let mut changes = Vec::new();
-                while let Some(change) = core.next(now_ms) {
-                    core.fold(&change);
-                    changes.push(change);
-                }
-                changes
-            };
-            let changes = self.off_thread(following).await?;
-            self.fold_all(changes);
-        }
         loop {
+            if self.unit.state.core.is_draw_due() {
+                let following = move |mut core: Tournament| {
+                    let mut changes = Vec::new();
+                    while let Some(change) = core.next(now_ms) {
+                        core.fold(&change);
+                        changes.push(change);
+                    }
+                    changes
+                };
+                let changes = self.off_thread(following).await?;
+                self.fold_all(changes);
+            }
             let next = self.unit.state.core.next(now_ms);
             let Some(change) = next else { return Ok(()) };
             self.fold(change);

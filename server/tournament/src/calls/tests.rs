@@ -346,3 +346,34 @@ fn few_games_are_checked_while_everyone_is_absent() {
     let checks = tournament.scheduler.checks;
     assert!(checks < 8 * games, "{checks}");
 }
+
+/// A draw takes a while, so it is known beforehand when one comes.
+#[test]
+fn rounds_are_drawn_exactly_when_they_are_due() {
+    for format in [Format::RoundRobin, Format::Swiss, Format::Knockout] {
+        let settings = Settings {
+            start_when_joined: Some(8),
+            ..testing::settings(format)
+        };
+        let mut tournament = testing::joined(settings, [None; 8]);
+        while !tournament.state().is_over() {
+            let is_due = tournament.is_draw_due();
+            let mut paused = tournament.clone();
+            if let Ok(Some(pause)) = paused.set_paused(true) {
+                paused.fold(&pause);
+                assert!(!paused.is_draw_due(), "{format:?}");
+            }
+            if let Some(change) = tournament.next(0) {
+                let draws = matches!(
+                    change,
+                    Change::Joined(_) | Change::Begun { .. } | Change::Drawn { .. }
+                );
+                assert_eq!(draws, is_due, "{format:?}: {change:?}");
+                tournament.fold(&change);
+            } else {
+                let game = tournament.playing().next().expect("it is not over");
+                end_one(&mut tournament, game, played());
+            }
+        }
+    }
+}
