@@ -118,7 +118,7 @@ impl Tournaments {
     /// Whether a tournament has announced a game with this id.
     pub fn has_announced(&self, game: GameId) -> bool {
         let announces = |(_, handle): &(u64, Arc<TournamentHandle>)| {
-            (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
+            handle.committed().announced.contains(&game)
         };
         self.earlier(None).iter().any(announces)
     }

@@ -1,6 +1,6 @@
 //! The state of a tournament, and what is shared besides it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -32,6 +32,8 @@ pub struct TournamentState {
     pub(super) tickets: BTreeMap<usize, SecretHash>,
     /// Rooms and game ids of the tournament's games.
     pub(super) placed: BTreeMap<usize, (RoomId, GameId)>,
+    /// All of these game ids, those that others have replaced, too.
+    pub(super) announced: HashSet<GameId>,
     /// Ids of the connections that have participants now.
     pub(super) connected: BTreeMap<usize, u64>,
 }
@@ -43,6 +45,7 @@ impl TournamentState {
             core,
             tickets: BTreeMap::new(),
             placed: BTreeMap::new(),
+            announced: HashSet::new(),
             connected: BTreeMap::new(),
         }
     }
@@ -96,7 +99,10 @@ impl TournamentState {
                 game,
                 room_id,
                 game_id,
-            } => drop(self.placed.insert(*game, (*room_id, *game_id))),
+            } => {
+                self.placed.insert(*game, (*room_id, *game_id));
+                self.announced.insert(*game_id);
+            }
         }
     }
 
