@@ -93,7 +93,7 @@ impl<U: Journaled> Registry<U> {
     ///
     /// # Errors
     /// They are not.
-    pub(crate) fn check_accepting(&self) -> Result<(), Problem<U>> {
+    fn check_accepting(&self) -> Result<(), Problem<U>> {
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown(U::KIND));
         }
@@ -110,7 +110,8 @@ impl<U: Journaled> Registry<U> {
     /// has: then returns that one.
     ///
     /// # Errors
-    /// The request id was used for another one, its creator has too many, or `make` failed.
+    /// Nothing new is accepted, the request id was used for another one, its creator has too many, or
+    /// `make` failed.
     pub(crate) async fn create_once(
         self: &Arc<Self>,
         owner: Token<U::Kind>,
@@ -327,11 +328,20 @@ struct Reservation<U: Journaled> {
 
 impl<U: Journaled> Reservation<U> {
     /// Reserves a place for a unit; `None` if it is being created or has just been.
-    fn of(registry: &Arc<Registry<U>>, id: UnitId, charged: Key) -> Result<Option<Self>, Refused> {
+    ///
+    /// # Errors
+    /// Nothing new is accepted, or its creator has too many.
+    fn of(
+        registry: &Arc<Registry<U>>,
+        id: UnitId,
+        charged: Key,
+    ) -> Result<Option<Self>, Problem<U>> {
+        let accepting = registry.check_accepting();
         let mut table = registry.lock();
         if table.is_in_creation(id) || table.get(id).is_some() {
             return Ok(None);
         }
+        accepting?;
         let places = &registry.places;
         let place = places.try_take(charged);
         let place = place.ok_or_else(|| U::too_many(places.share_of(charged) as u64))?;

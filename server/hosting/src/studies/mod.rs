@@ -86,7 +86,6 @@ impl Studies {
         let checked = (checking.await)
             .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
             .map_err(CreateProblem::Settings)?;
-        self.check_accepting()?;
         let owner: StudyToken = owner_of(request);
         let owner = Token {
             subject: shortened(owner.subject),

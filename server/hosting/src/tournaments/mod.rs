@@ -68,7 +68,6 @@ impl Tournaments {
         charged: Key,
     ) -> Result<(Arc<TournamentHandle>, TournamentToken), CreateProblem> {
         let core = Tournament::new(plan.core.clone()).map_err(CreateProblem::Settings)?;
-        self.check_accepting()?;
         let owner = owner_of(request);
         let (tournaments, name) = (Arc::clone(self), name.to_owned());
         let making = async move { tournaments.make(&name, plan, core, owner).await };

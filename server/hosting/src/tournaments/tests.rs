@@ -209,6 +209,12 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     assert_eq!(second.expect("joined"), joined);
     handle.begin().await.expect("it can start");
     assert_eq!(handle.join(ada()).await, Ok(joined));
+    // Also when nothing new is accepted any more.
+    tournaments.stop();
+    let (other, again) = create().await.expect("there");
+    assert!(Arc::ptr_eq(&handle, &other) && owner == again);
+    let refused = tournaments.create("Coppa", plan(), None, Key::Local).await;
+    assert!(matches!(refused, Err(CreateProblem::ShuttingDown(_))));
     tournaments.end();
 
     let tournaments = start();
