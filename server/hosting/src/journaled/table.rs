@@ -81,9 +81,12 @@ impl<U: Journaled> Table<U> {
             number += 1;
         }
         self.numbers.insert(id, number);
-        let code = handle.header.join_code();
-        self.codes
-            .extend(code.map(|code| (code.to_owned(), number)));
+        // The codes of units that are over are given to new ones, which are found by them.
+        if let Some(code) = handle.header.join_code()
+            && !(handle.is_over() && self.by_code(code).is_some_and(|other| !other.is_over()))
+        {
+            self.codes.insert(code.to_owned(), number);
+        }
         self.by_number.insert(number, handle);
     }
 
@@ -97,7 +100,9 @@ impl<U: Journaled> Table<U> {
     fn remove(&mut self, number: u64) {
         if let Some(handle) = self.by_number.remove(&number) {
             self.numbers.remove(&handle.id().unit());
-            if let Some(code) = handle.header.join_code() {
+            if let Some(code) = handle.header.join_code()
+                && self.codes.get(code) == Some(&number)
+            {
                 self.codes.remove(code);
             }
         }

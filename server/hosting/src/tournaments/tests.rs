@@ -288,6 +288,36 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
     }
 }
 
+#[tokio::test]
+async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let config = ServerConfig::default();
+    let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+    let tournaments = Tournaments::new(rooms, TaskTracker::new());
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
+    let (open, _) = created.expect("made");
+    // Its code was that of a tournament that another node had.
+    let former = TournamentHeader {
+        id: TournamentId::random(),
+        ..open.header.clone()
+    };
+    let key = chefshat_store::units::UnitKey::Tournament(open.id());
+    let mut stored = store.unit(key).await.expect("readable").expect("stored");
+    stored.header = former.to_bytes();
+    let closed = [TournamentEntry::Change(Change::Closed)];
+    stored.rows.push(TournamentEntry::to_bytes(&closed));
+    assert!(tournaments.resume(former.id, stored).await);
+    let shown = tournaments.get(former.id).expect("it is shown");
+    assert!(shown.is_over());
+    let found = || tournaments.by_code(open.join_code()).map(|it| it.id());
+    assert_eq!(found(), Some(open.id()));
+    tournaments.forget_one(former.id);
+    assert_eq!(found(), Some(open.id()));
+}
+
 /// The games of a tournament that was played to its end on this store.
 async fn played(store: &Arc<FailingStore>) -> (Arc<TournamentHandle>, Vec<GameState>) {
     let rooms = Rooms::new(
