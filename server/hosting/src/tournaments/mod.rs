@@ -36,7 +36,7 @@ use crate::config::MAX_START_AHEAD;
 use crate::journaled::{self, Folded, New, Registry, owner_of};
 use crate::rooms::{CODES_TRIED, Rooms};
 use chefshat_admission::limits::Key;
-use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_room::ids::{GameId, RequestKey, TournamentToken, join_code, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
@@ -53,7 +53,13 @@ pub type Tournaments = Registry<TournamentTask>;
 impl Tournaments {
     /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
     pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
-        Self::empty(rooms, tracker, Common::default())
+        Self::at(since_epoch_ms, rooms, tracker)
+    }
+
+    /// As [`Tournaments::new`], with this clock.
+    pub fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        let reading = Default::default();
+        Self::empty(rooms, tracker, Common { now, reading })
     }
 
     /// Creates a tournament. Returns it with its owner token.
@@ -81,11 +87,12 @@ impl Tournaments {
         core: Tournament,
         owner: TournamentToken,
     ) -> Result<New<TournamentTask>, CreateProblem> {
-        check_start(plan.start_at_ms).map_err(CreateProblem::Settings)?;
+        let now_ms = (self.common.now)();
+        check_start(plan.start_at_ms, now_ms).map_err(CreateProblem::Settings)?;
         let mut header = TournamentHeader {
             id: owner.subject,
             settings: convert::settings_to_proto(name, &plan),
-            created_at_ms: since_epoch_ms(),
+            created_at_ms: now_ms,
             join_code: join_code(),
             owner: owner.hash(),
             deal_secret: random_bytes(),
@@ -163,9 +170,8 @@ impl Tournaments {
 }
 
 /// Checks when a new tournament starts by itself.
-fn check_start(at_ms: Option<u64>) -> Result<(), SettingsProblem> {
+fn check_start(at_ms: Option<u64>, now_ms: u64) -> Result<(), SettingsProblem> {
     let Some(at_ms) = at_ms else { return Ok(()) };
-    let now_ms = since_epoch_ms();
     let latest = now_ms.saturating_add(millis(MAX_START_AHEAD));
     let problem = match at_ms {
         at_ms if at_ms <= now_ms => "this time has passed; choose a later one, or none",

@@ -9,6 +9,7 @@ use tokio::sync::Mutex as AsyncMutex;
 
 use super::message::{Entry, JoinRefusal};
 use super::shared::{AsOf, Shared};
+use chefshat_base::clock::TimeOfDay;
 use chefshat_room::ids::{GameId, RoomId, SecretHash, TournamentToken};
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry};
 use chefshat_wire::convert::{self, TournamentPlan};
@@ -17,8 +18,9 @@ use chefshat_wire::convert::{self, TournamentPlan};
 const READ_AT_ONCE: usize = 4;
 
 /// What all tournaments of a server share.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Common {
+    pub(super) now: TimeOfDay,
     /// Locked while something that is over is read.
     pub(super) reading: [AsyncMutex<()>; READ_AT_ONCE],
 }

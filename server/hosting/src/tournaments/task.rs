@@ -10,12 +10,13 @@ use tokio::time::Instant;
 use tracing::info;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
+use super::millis;
 use super::state::{Common, TournamentShared, TournamentState, restored};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::limits::{Key, Refused};
-use chefshat_base::clock::{RoomClock, since_epoch_ms};
+use chefshat_base::clock::{RoomClock, TimeOfDay};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, RoomId, SecretHash, TournamentId, TournamentToken};
 use chefshat_store::StoreError;
@@ -26,6 +27,9 @@ use chefshat_wire::outbox::StreamEnd;
 
 /// When it is worth trying again to create a tournament.
 const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
+/// How often a tournament that waits for a time of day looks whether it has come: the clock may be
+/// set meanwhile, or the machine sleep.
+const CLOCK_CHECK: Duration = Duration::from_secs(60);
 
 impl UnitHeader for TournamentHeader {
     type Kind = ids::Tournament;
@@ -65,8 +69,7 @@ pub struct TournamentTask {
     pub(super) retired: BTreeSet<(usize, usize)>,
     /// When a participant last joined, or the server was started.
     joined_at: Instant,
-    /// When it starts by itself.
-    start_at: Option<Instant>,
+    now: TimeOfDay,
     /// When it was paused, or the server was started.
     paused_at: Option<Instant>,
     /// Times of the core: a pause of the process makes no participant late.
@@ -147,11 +150,10 @@ impl Journaled for TournamentTask {
         }
     }
 
-    fn new(unit: Unit<Self>, _: &Common) -> Self {
-        let start_at_ms = unit.handle.plan.start_at_ms;
-        let start_in = start_at_ms.map(|at| at.saturating_sub(since_epoch_ms()));
+    fn new(unit: Unit<Self>, common: &Common) -> Self {
         let now = Instant::now();
         Self {
+            now: common.now,
             connections: BTreeMap::new(),
             without_room: BTreeSet::new(),
             seen: BTreeSet::new(),
@@ -159,7 +161,6 @@ impl Journaled for TournamentTask {
             left_early: BTreeMap::new(),
             retired: BTreeSet::new(),
             joined_at: now,
-            start_at: start_in.map(|time| now + Duration::from_millis(time)),
             paused_at: unit.state.core.is_paused().then_some(now),
             clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
             unit,
@@ -253,10 +254,11 @@ impl Journaled for TournamentTask {
     fn wake_at(&self) -> Option<Instant> {
         let core = self.unit.state.core.wake_at();
         let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
+        let start = (self.unit.handle.plan.start_at_ms).map(|at_ms| self.look_at(at_ms));
         core.into_iter()
             .chain(self.unit.retry.at())
             .chain(self.open_until())
-            .chain(self.start_at.filter(|_| self.unit.state.core.can_begin()))
+            .chain(start.filter(|_| self.unit.state.core.can_begin()))
             .chain(self.paused_until())
             .min()
     }
@@ -282,8 +284,15 @@ impl Journaled for TournamentTask {
 impl TournamentTask {
     /// Whether it starts by itself now.
     fn is_due_to_start(&self) -> bool {
-        let is_time = self.start_at.is_some_and(|at| at <= Instant::now());
+        let start_at_ms = self.unit.handle.plan.start_at_ms;
+        let is_time = start_at_ms.is_some_and(|at_ms| at_ms <= (self.now)());
         is_time && self.unit.state.core.can_begin()
+    }
+
+    /// When it is to be looked whether this time of day has come, [`CLOCK_CHECK`] from now at most.
+    fn look_at(&self, at_ms: u64) -> Instant {
+        let left = Duration::from_millis(at_ms.saturating_sub((self.now)()));
+        Instant::now() + left.min(CLOCK_CHECK)
     }
 
     /// When a paused tournament resumes by itself.
@@ -295,8 +304,11 @@ impl TournamentTask {
     /// When a tournament that nobody starts or joins is closed.
     fn open_until(&self) -> Option<Instant> {
         let is_open = self.unit.state.core.state() == State::Open;
-        let since = self.start_at.unwrap_or(self.joined_at).max(self.joined_at);
-        is_open.then(|| since + TOURNAMENT_OPEN_TIME)
+        let start_at_ms = self.unit.handle.plan.start_at_ms;
+        let by_start = start_at_ms
+            .map(|at_ms| self.look_at(at_ms.saturating_add(millis(TOURNAMENT_OPEN_TIME))));
+        let by_entry = self.joined_at + TOURNAMENT_OPEN_TIME;
+        is_open.then(|| by_start.map_or(by_entry, |at| at.max(by_entry)))
     }
 
     /// Closes a tournament that nobody starts or joins, and resumes one that was paused for long.

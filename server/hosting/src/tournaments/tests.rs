@@ -1,5 +1,6 @@
 //! Creating, joining and restoring tournaments.
 
+use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
 use futures::FutureExt as _;
@@ -240,7 +241,19 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
 fn in_memory() -> Arc<Tournaments> {
     let store: Arc<dyn Store> = Arc::new(chefshat_store::MemoryStore::default());
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-    Tournaments::new(rooms, TaskTracker::new())
+    Tournaments::at(stopped_clock, rooms, TaskTracker::new())
+}
+
+std::thread_local! {
+    /// When the test of this thread began, on its stopped clock.
+    static BEGAN: tokio::time::Instant = tokio::time::Instant::now();
+    /// How much the time of day of this thread is ahead, milliseconds.
+    static AHEAD_MS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// A time of day that advances with the clock of the test.
+fn stopped_clock() -> u64 {
+    1_000_000 + millis(BEGAN.with(tokio::time::Instant::elapsed)) + AHEAD_MS.get()
 }
 
 /// Waits until a tournament is in this state, however long that takes on the paused clock.
@@ -265,7 +278,7 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
         let plan = plan.expect("valid settings");
         tournaments.create("Coppa", plan, None, Key::Local).await
     };
-    let now_ms = since_epoch_ms();
+    let now_ms = stopped_clock();
     let before = tokio::time::Instant::now();
     let (handle, _) = create(4, now_ms + hour_ms).await.expect("made");
     assert_eq!(handle.read(Tournament::state), State::Open);
@@ -273,19 +286,39 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
     assert!(before.elapsed() >= Duration::from_millis(hour_ms - 60_000));
 
     // With too few it waits for the second.
-    let (handle, _) = create(1, since_epoch_ms() + 1_000).await.expect("made");
+    let (handle, _) = create(1, stopped_clock() + 1_000).await.expect("made");
     tokio::time::sleep(Duration::from_secs(60)).await;
     assert_eq!(handle.read(Tournament::state), State::Open);
     let joined = handle.join(entrant("Ada")).await;
     joined.expect("joined");
     until(&handle, |core| core.state() != State::Open).await;
 
-    for refused in [now_ms - 1, since_epoch_ms() + 367 * 24 * hour_ms] {
+    for refused in [now_ms - 1, stopped_clock() + 367 * 24 * hour_ms] {
         let problem = create(4, refused)
             .await
             .expect_err("not a time to start at");
         assert!(problem.to_string().starts_with("start_at_ms"), "{problem}");
     }
+}
+
+/// A server may start before its clock is set, and machines sleep.
+#[tokio::test(start_paused = true)]
+async fn it_starts_at_its_time_although_the_clock_was_set_meanwhile() {
+    let tournaments = in_memory();
+    let days_ms = 300 * 24 * 3_600_000;
+    let settings = chefshat_proto::v1::TournamentSettings {
+        start_at_ms: stopped_clock() + days_ms,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
+    let (handle, _) = created.expect("made");
+    let a_while = Duration::from_secs(120);
+    tokio::time::sleep(a_while).await;
+    assert_eq!(handle.read(Tournament::state), State::Open);
+    AHEAD_MS.set(days_ms);
+    tokio::time::sleep(a_while).await;
+    assert_ne!(handle.read(Tournament::state), State::Open);
 }
 
 #[tokio::test]
