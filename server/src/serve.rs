@@ -344,11 +344,11 @@ impl Server {
             LongTask::StalledConnections,
             Arc::clone(&connections).close_stalled().boxed(),
         ));
+        let retention = Retention::new(Arc::clone(&rooms));
         if let Some(keep) = config.keep_games {
-            let retention = Retention::new(Arc::clone(&rooms));
             tracker.spawn(until_closing(
                 LongTask::Retention,
-                retention.follow(keep).boxed(),
+                retention.clone().follow(keep).boxed(),
             ));
         }
         tracker.spawn(until_closing(
@@ -366,6 +366,7 @@ impl Server {
             &connections,
             &config,
             &closing,
+            retention,
         )?
         .add_service(health_service)
         .add_service(reflection());
@@ -582,6 +583,7 @@ fn routes(
     connections: &Arc<Connections>,
     config: &ServerConfig,
     closing: &CancellationToken,
+    retention: Retention,
 ) -> Result<Routes, ServeError> {
     use crate::wire::service::play_service_server::PlayServiceServer;
     use crate::wire::service::spectator_service_server::SpectatorServiceServer;
@@ -598,7 +600,6 @@ fn routes(
     use v1::vector_service_server::VectorServiceServer;
     let lookup = grpc::Lookup::new(Arc::clone(rooms), Arc::clone(tournaments));
     let recorded = grpc::Recorded::new(lookup.clone(), config.access.records)?;
-    let retention = Retention::new(Arc::clone(rooms));
     let study_calls = grpc::StudyCalls::new(
         Arc::clone(studies),
         lookup.clone(),

@@ -4,17 +4,21 @@
 //! delete.
 
 use std::collections::BTreeSet;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_record::{atomic_file, jsonl};
+use chefshat_record::atomic_file::{self, AtomicFile, WriteError};
+use chefshat_record::jsonl;
 use chefshat_room::ids::GameId;
+use tokio::sync::Mutex;
 use tracing::{error, info, warn};
 
 use crate::config::{DELETION_PAUSE, GAMES_DELETED_AT_ONCE, KeepGames};
 use crate::rooms::Rooms;
 use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::tasks::short;
 use chefshat_store::samples::Undeleted;
 use chefshat_store::{DiskUsage, Keep, StoreError};
 
@@ -68,12 +72,17 @@ pub struct Usage {
 #[derive(Debug, Clone)]
 pub struct Retention {
     rooms: Arc<Rooms>,
+    /// Locked by the run that deletes: each notes what it deletes in the same file.
+    running: Arc<Mutex<()>>,
 }
 
 impl Retention {
     /// For the games of these rooms. Their store knows which of them tournaments and studies need.
     pub fn new(rooms: Arc<Rooms>) -> Self {
-        Self { rooms }
+        Self {
+            rooms,
+            running: Arc::default(),
+        }
     }
 
     /// How much is stored.
@@ -98,27 +107,32 @@ impl Retention {
     /// # Errors
     /// The store failed. What was deleted until then stays deleted.
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
+        let retention = self.clone();
+        // Runs to completion even if the caller is cancelled: what it deletes must be counted.
+        let pruning = tokio::spawn(short("one deletion", async move {
+            let _running = retention.running.lock().await;
+            retention.prune_alone(keep).await
+        }));
+        (pruning.await)
+            .map_err(|error| StoreError::Failed(format!("deleting old games failed: {error}")))?
+    }
+
+    async fn prune_alone(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
-        let mut pruned = Pruned::default();
         if let Err(error) = self.delete(self.left_over()).await {
             error!(%error, "completing an earlier deletion failed");
         }
-        let mut after = 0;
-        loop {
-            let store = self.rooms.store();
-            let found = store.prunable(keep, after, GAMES_DELETED_AT_ONCE).await?;
-            let Some((last, _)) = found.last() else { break };
-            after = *last;
-            let games: Vec<GameId> = found.into_iter().map(|(_, game)| game).collect();
-            pruned.games += self.delete(games).await?;
-            tokio::time::sleep(DELETION_PAUSE).await;
+        let deleted = self.delete_but(keep).await;
+        // The leaderboard counts only what is left, also if some were deleted and then the store failed.
+        if deleted != Ok(0) {
+            self.rooms.count_forgotten();
         }
+        let games = deleted?;
         let after = self.usage().await?;
         let bytes = |usage: &Usage| usage.disk.bytes + usage.record_bytes;
-        pruned.freed_bytes = bytes(&before).saturating_sub(bytes(&after));
-        if pruned.games > 0 {
-            // The leaderboard counts only what is left.
-            self.rooms.count_forgotten();
+        let freed_bytes = bytes(&before).saturating_sub(bytes(&after));
+        let pruned = Pruned { games, freed_bytes };
+        if games > 0 {
             info!(
                 games = pruned.games,
                 freed_bytes = pruned.freed_bytes,
@@ -128,9 +142,25 @@ impl Retention {
         Ok(pruned)
     }
 
+    /// Deletes all but those to keep. Returns how many it did.
+    async fn delete_but(&self, keep: Keep) -> Result<u64, StoreError> {
+        let (mut after, mut count) = (0, 0);
+        loop {
+            let store = self.rooms.store();
+            let found = store.prunable(keep, after, GAMES_DELETED_AT_ONCE).await?;
+            let Some((last, _)) = found.last() else {
+                return Ok(count);
+            };
+            after = *last;
+            let games: Vec<GameId> = found.into_iter().map(|(_, game)| game).collect();
+            count += self.delete(games).await?;
+            tokio::time::sleep(DELETION_PAUSE).await;
+        }
+    }
+
     /// Deletes those of these games that nothing needs, and their files. Returns how many it did. Files
     /// that the file system keeps are tried again by the next run.
-    pub(crate) async fn delete(&self, games: Vec<GameId>) -> Result<u64, StoreError> {
+    async fn delete(&self, games: Vec<GameId>) -> Result<u64, StoreError> {
         if games.is_empty() {
             return Ok(0);
         }
@@ -189,12 +219,18 @@ fn note<'g>(data_dir: &Path, games: impl Iterator<Item = &'g GameId>) {
     let ids: Vec<String> = games.map(GameId::to_string).collect();
     let noted = match ids.is_empty() {
         true => atomic_file::remove(&path),
-        false => std::fs::write(path, ids.join("\n")),
+        false => write(&path, &ids.join("\n")).map_err(io::Error::other),
     };
     // A disk that is full must not prevent what frees space.
     if let Err(error) = noted {
         warn!(%error, "files of deleted games may be left behind");
     }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), WriteError> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(text.as_bytes())?;
+    file.finish()
 }
 
 /// Bytes and number of the files of a folder.
@@ -210,15 +246,58 @@ fn size_of(folder: &Path) -> (u64, u64) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::Ordering;
+
     use chefshat_record::samples;
     use chefshat_room::journal::{GameHeader, TournamentGame};
     use chefshat_room::policy::Durability;
+    use futures::FutureExt as _;
     use tokio_util::task::TaskTracker;
 
     use super::*;
     use crate::config::ServerConfig;
-    use chefshat_store::testing::{TypedUnits as _, cup, header, summary};
+    use chefshat_store::testing::{FailingStore, TypedUnits as _, cup, header, summary};
     use chefshat_store::{MemoryStore, Store};
+
+    /// Stores games that are over.
+    async fn finished(store: &dyn Store, games: impl IntoIterator<Item = u8>) {
+        for game in games {
+            let header = header(game, Durability::Durable);
+            let created = store.create(Arc::clone(&header), Vec::new()).await;
+            let mut journal = created.expect("a new game");
+            let finished = journal.finish(Some(summary(&header)), None).await;
+            finished.expect("committed");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn deleted_games_are_counted_although_the_store_fails_or_the_caller_leaves() {
+        let store = Arc::new(FailingStore::after(u64::MAX));
+        // The newest is always kept.
+        let count = GAMES_DELETED_AT_ONCE + 2;
+        let count = u8::try_from(count).expect("few");
+        finished(store.as_ref(), 1..=count).await;
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, Arc::clone(&store) as _, TaskTracker::new());
+        let rooms = rooms.expect("threads");
+        let retention = Retention::new(Arc::clone(&rooms));
+        let newest = Keep {
+            newest: Some(1),
+            ..Keep::default()
+        };
+        store.prunes_left.store(1, Ordering::Relaxed);
+        let pruned = retention.prune(newest).await;
+        assert!(pruned.is_err(), "{pruned:?}");
+        assert_eq!(store.finished_games().await, Ok(2));
+        assert_eq!(rooms.forgotten(), 1);
+
+        store.prunes_left.store(u64::MAX, Ordering::Relaxed);
+        assert!(retention.prune(newest).now_or_never().is_none());
+        let pruned = retention.prune(newest).await.expect("the rest");
+        assert_eq!(pruned.games, 0, "the first run has deleted it");
+        assert_eq!(store.finished_games().await, Ok(1));
+        assert_eq!(rooms.forgotten(), 2);
+    }
 
     /// What the store keeps, keeps its files, also if it was to be deleted; and what a server that ended
     /// in between has left is deleted by the next run.

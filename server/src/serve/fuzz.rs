@@ -422,6 +422,7 @@ async fn serve_edited(which: usize, edits: &Edits, frames: bool) {
         &server.connections,
         &server.config,
         &closing,
+        Retention::new(Arc::clone(&server.rooms)),
     )
     .expect("valid settings");
     let room: v1::CreateRoomResponse =

@@ -33,6 +33,12 @@ pub struct FailingStore {
     pub games_unreadable: AtomicBool,
     /// Whether journals of games cannot be read.
     pub journals_unreadable: Arc<AtomicBool>,
+    /// Whether appending to journals of games panics.
+    pub journals_panic: Arc<AtomicBool>,
+    /// Number of parts of the list of games that can still be read.
+    pub lists_left: AtomicU64,
+    /// Number of deletions of old games that still succeed.
+    pub prunes_left: AtomicU64,
 }
 
 impl FailingStore {
@@ -47,6 +53,9 @@ impl FailingStore {
             unreadable: Mutex::default(),
             games_unreadable: AtomicBool::new(false),
             journals_unreadable: Arc::default(),
+            journals_panic: Arc::default(),
+            lists_left: AtomicU64::new(u64::MAX),
+            prunes_left: AtomicU64::new(u64::MAX),
         }
     }
 }
@@ -81,6 +90,14 @@ fn injected_failure() -> StoreError {
     StoreError::Failed("injected failure".into())
 }
 
+/// Takes one of those that are left.
+fn take_one(left: &AtomicU64) -> Result<(), StoreError> {
+    let taken = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+        left.checked_sub(1)
+    });
+    taken.map(drop).map_err(|_| injected_failure())
+}
+
 #[async_trait]
 impl Store for FailingStore {
     fn outlives_server(&self) -> bool {
@@ -97,6 +114,7 @@ impl Store for FailingStore {
             appends_left: Arc::clone(&self.appends_left),
             has_failed: self.has_failed.clone(),
             unreadable: Arc::clone(&self.journals_unreadable),
+            panics: Arc::clone(&self.journals_panic),
         }))
     }
 
@@ -127,6 +145,7 @@ impl Store for FailingStore {
         part: Part,
         count: usize,
     ) -> Result<Vec<Listed>, StoreError> {
+        take_one(&self.lists_left)?;
         self.count(Read::List);
         self.inner.list(filter, part, count).await
     }
@@ -154,6 +173,7 @@ impl Store for FailingStore {
     }
 
     async fn prune(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        take_one(&self.prunes_left)?;
         self.inner.prune(games).await
     }
 
@@ -218,22 +238,19 @@ struct FailingJournal {
     appends_left: Arc<AtomicU64>,
     has_failed: watch::Sender<bool>,
     unreadable: Arc<AtomicBool>,
+    panics: Arc<AtomicBool>,
 }
 
 #[async_trait]
 impl Journal for FailingJournal {
     async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
-        let allowed = self
-            .appends_left
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
-                left.checked_sub(1)
-            })
-            .is_ok();
-        if allowed {
-            return self.inner.append(entries).await;
+        let panics = self.panics.load(Ordering::Relaxed);
+        assert!(!panics, "the journal is asked to panic");
+        if let Err(failure) = take_one(&self.appends_left) {
+            self.has_failed.send_replace(true);
+            return Err(failure);
         }
-        self.has_failed.send_replace(true);
-        Err(injected_failure())
+        self.inner.append(entries).await
     }
 
     async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
