@@ -18,7 +18,7 @@ use tokio::time::Instant;
 use super::shared::{ComputeError, Shared};
 use crate::config::{LEADERBOARD_AGE, LEADERBOARD_READ_AGAIN, LEADERBOARD_SHARE};
 use crate::rooms::Rooms;
-use chefshat_store::{Listed, Part, Store};
+use chefshat_store::{Listed, Part, Store, StoreError};
 
 /// Summaries read at a time.
 const PAGE: usize = 1_000;
@@ -38,7 +38,8 @@ pub struct Leaderboard {
 /// Computed ratings.
 #[derive(Debug)]
 struct Board {
-    ratings: Arc<Ratings<Identity>>,
+    /// Those before, if the store failed, or why there are none.
+    ratings: Result<Arc<Ratings<Identity>>, ComputeError>,
     /// Number of participants whose data had been deleted before.
     forgotten: u64,
     /// When they were computed, and how long that took.
@@ -60,6 +61,8 @@ struct Folded {
     ratings: Ratings<Identity>,
     /// The newest games, by when they ended and their ids, with the results of their participants.
     held_back: BTreeMap<(u64, String), Vec<(Identity, Finish)>>,
+    /// The ratings after all games, when all had been read.
+    shown: Option<Arc<Ratings<Identity>>>,
     /// The last number.
     after: u64,
     /// Number of participants whose data had been deleted when the first game was read, and when
@@ -73,6 +76,7 @@ impl Folded {
         Self {
             ratings: Ratings::default(),
             held_back: BTreeMap::new(),
+            shown: None,
             after: 0,
             forgotten,
             since: Instant::now(),
@@ -133,16 +137,25 @@ impl Leaderboard {
         let known = Arc::clone(&self.folded);
         let work = async move {
             let (began, forgotten) = (Instant::now(), rooms.forgotten());
-            // One works at a time. After a failure nothing is left, and all is read again.
-            let folded = known.lock().await.take();
-            let folded = folded.filter(|it| it.is_valid(forgotten));
+            // One works at a time.
+            let former = known.lock().await.take();
+            let former = former.filter(|it| it.forgotten == forgotten);
+            let shown = former.as_ref().and_then(|it| it.shown.clone());
+            let folded = former.filter(|it| it.is_valid(forgotten));
             let folded = folded.unwrap_or_else(|| Folded::new(forgotten));
-            let folded = read_on(rooms.store().as_ref(), folded).await?;
-            let rating = tokio::task::spawn_blocking(move || (folded.ratings(), folded));
-            let (ratings, folded) = rating.await?;
+            let (folded, failed) = read_on(rooms.store().as_ref(), folded).await?;
+            let rating = tokio::task::spawn_blocking(move || {
+                let ratings = match failed {
+                    None => Ok(Arc::new(folded.ratings())),
+                    Some(error) => shown.ok_or(error.into()),
+                };
+                (ratings, folded)
+            });
+            let (ratings, mut folded) = rating.await?;
+            folded.shown = ratings.clone().ok();
             *known.lock().await = Some(folded);
             Ok(Board {
-                ratings: Arc::new(ratings),
+                ratings,
                 forgotten,
                 at: Instant::now(),
                 took: began.elapsed(),
@@ -153,22 +166,26 @@ impl Leaderboard {
             .known
             .get(|board| board.is_current(forgotten), work)
             .await?;
-        Ok(Arc::clone(&board.ratings))
+        board.ratings.clone()
     }
 }
 
-/// Adds what a store has listed since, page by page.
-async fn read_on(store: &dyn Store, mut folded: Folded) -> Result<Folded, ComputeError> {
+/// Adds what a store has listed since, page by page. Returns also why it stopped before the last one.
+async fn read_on(
+    store: &dyn Store,
+    mut folded: Folded,
+) -> Result<(Folded, Option<StoreError>), ComputeError> {
     let filter = v1::RecordFilter {
         origin: v1::GameOrigin::Dealt.into(),
         hosted_here: true,
         ..v1::RecordFilter::default()
     };
     loop {
-        let page = store.list(&filter, Part::After(folded.after), PAGE).await?;
-        if page.is_empty() {
-            return Ok(folded);
-        }
+        let page = match store.list(&filter, Part::After(folded.after), PAGE).await {
+            Ok(page) if page.is_empty() => return Ok((folded, None)),
+            Ok(page) => page,
+            Err(error) => return Ok((folded, Some(error))),
+        };
         let folding = tokio::task::spawn_blocking(move || {
             folded.add(page);
             folded
@@ -195,6 +212,7 @@ pub fn finish(seat: RatedSeat) -> (Identity, Finish) {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
+    use std::sync::atomic::Ordering;
 
     use chefshat_room::ids::Id;
     use chefshat_room::journal::GameHeader;
@@ -204,6 +222,7 @@ mod tests {
     use crate::rooms::NewRoom;
     use crate::tournaments::leaderboard::*;
     use chefshat_store::MemoryStore;
+    use chefshat_store::testing::FailingStore;
 
     /// Participants of equal skill, one of whom hosts games of its own.
     const PLAYERS: usize = 18;
@@ -390,7 +409,7 @@ mod tests {
 
     fn board(took: Duration) -> Board {
         Board {
-            ratings: Arc::default(),
+            ratings: Ok(Arc::default()),
             forgotten: 0,
             at: Instant::now(),
             took,
@@ -442,13 +461,17 @@ mod tests {
     }
 
     /// The rooms of a node that has this store.
-    fn rooms(store: &Arc<MemoryStore>) -> Arc<Rooms> {
-        let store = Arc::clone(store) as Arc<dyn Store>;
-        Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads")
+    fn rooms(store: &Arc<dyn Store>) -> Arc<Rooms> {
+        Rooms::new(
+            &ServerConfig::default(),
+            Arc::clone(store),
+            TaskTracker::new(),
+        )
+        .expect("threads")
     }
 
     /// Stores a game that another node has played.
-    async fn played(store: &MemoryStore, header: &GameHeader, game: u64, winner: &str) {
+    async fn played(store: &dyn Store, header: &GameHeader, game: u64, winner: &str) {
         let header = GameHeader {
             game_id: Id::from_bytes(u128::from(game).to_be_bytes()),
             ..header.clone()
@@ -466,14 +489,14 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_node_where_no_game_ends_shows_those_of_others() {
-        let store = Arc::new(MemoryStore::default());
+        let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
         let rooms = rooms(&store);
         let created = rooms.create(NewRoom::for_tests()).await.expect("a room");
         let header = rooms.header(created.handle.id()).expect("it exists");
         let board = Leaderboard::new(Arc::clone(&rooms));
         assert_eq!(board.ratings().await.expect("readable").games(), 0);
         for (game, winner) in [(1, "Ada"), (2, "Cem")] {
-            played(&store, &header, game, winner).await;
+            played(store.as_ref(), &header, game, winner).await;
             tokio::time::advance(LEADERBOARD_AGE).await;
             let ratings = board.ratings().await.expect("readable");
             assert_eq!(ratings.games(), game);
@@ -487,6 +510,35 @@ mod tests {
         let ratings = board.ratings().await.expect("readable");
         assert_eq!(ratings.games(), 1);
         assert_eq!(names(&ratings).len(), 2);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_store_that_fails_is_read_on_after_a_while_and_the_ratings_before_stay() {
+        let store = Arc::new(FailingStore::after(u64::MAX));
+        let rooms = rooms(&(Arc::clone(&store) as Arc<dyn Store>));
+        let created = rooms.create(NewRoom::for_tests()).await.expect("a room");
+        let header = rooms.header(created.handle.id()).expect("it exists");
+        let board = Leaderboard::new(Arc::clone(&rooms));
+        let reads = || store.take_reads().len();
+        played(store.as_ref(), &header, 1, "Ada").await;
+        // The first page can be read, and not the second.
+        store.lists_left.store(1, Ordering::Relaxed);
+        assert!(board.ratings().await.is_err());
+        assert_eq!(reads(), 1);
+        store.lists_left.store(u64::MAX, Ordering::Relaxed);
+        assert!(board.ratings().await.is_err());
+        assert_eq!(reads(), 0, "it is asked later");
+        tokio::time::advance(LEADERBOARD_AGE).await;
+        assert_eq!(board.ratings().await.expect("readable").games(), 1);
+        assert_eq!(reads(), 1, "the first page is known");
+
+        played(store.as_ref(), &header, 2, "Cem").await;
+        store.lists_left.store(0, Ordering::Relaxed);
+        tokio::time::advance(LEADERBOARD_AGE).await;
+        assert_eq!(board.ratings().await.expect("those before").games(), 1);
+        // Those before may show a name that has been deleted.
+        rooms.count_forgotten();
+        assert!(board.ratings().await.is_err());
     }
 
     #[tokio::test]
