@@ -103,6 +103,8 @@ pub struct Study {
     presence: Presence,
     /// Since when its date has passed whenever [`Study::next`] was asked.
     past_date_since_ms: Option<u64>,
+    /// The participants of whom the changes have data: a pseudonym at least.
+    recorded: BTreeSet<u32>,
 }
 
 impl PartialEq for Study {
@@ -128,13 +130,27 @@ impl Study {
             state: StudyState::new(step_count),
             presence: Presence::default(),
             past_date_since_ms: None,
+            recorded: BTreeSet::new(),
         })
     }
 
     /// Applies a change. Does not check that the change follows; one that does not fit has no
     /// effect.
     pub fn fold(&mut self, change: &Change) {
+        if let Change::Added {
+            number, pseudonym, ..
+        } = change
+            && !pseudonym.is_empty()
+        {
+            self.recorded.insert(*number);
+        }
         self.state.apply(change);
+    }
+
+    /// Whether the changes had data of this participant when they were folded: [`Change::forget`]
+    /// leaves none.
+    pub fn is_recorded(&self, number: u32) -> bool {
+        self.recorded.contains(&number)
     }
 
     /// The settings.

@@ -257,24 +257,7 @@ impl Journaled for StudyTask {
         self.delete_again = None;
         let handle = Arc::clone(&self.unit.handle);
         let mut counts = handle.shared.traces.lock().await;
-        let store = self.unit.rooms.store();
-        let Some(stored) = StoredStudy::read(store.as_ref(), handle.id()).await? else {
-            return Ok(());
-        };
-        let mut changes = stored.changes;
-        let mut is_changed = false;
-        for change in &mut changes {
-            for number in &due {
-                is_changed |= change.forget(*number);
-            }
-        }
-        // Everybody has a pseudonym to forget, so an unchanged journal was written before, by a
-        // server that ended before its games were deleted. Traces were deleted with it.
-        if is_changed {
-            let forgotten = due.iter().copied().collect();
-            StoredStudy::rewrite(store.as_ref(), handle.id(), &changes, forgotten).await?;
-            self.unit.rows = 1;
-        }
+        let is_changed = self.forget(&due).await?;
         let played = due
             .iter()
             .filter_map(|number| self.unit.state.participant(*number));
@@ -390,6 +373,44 @@ impl StudyTask {
             let ended = self.unit.state.screen_out(number, now_ms);
             ended.into_iter().for_each(|change| self.fold(change));
         }
+    }
+
+    /// Deletes the data of participants from the journal. Returns whether it had them.
+    async fn forget(&mut self, forgotten: &BTreeSet<u32>) -> Result<bool, StoreError> {
+        // A server before may have rewritten it, and ended before their games were deleted. Traces
+        // were deleted with it.
+        let state = &self.unit.state;
+        if !forgotten.iter().any(|number| state.is_recorded(*number)) {
+            return Ok(false);
+        }
+        let store = self.unit.rooms.store();
+        let id = self.unit.handle.id();
+        let Some(stored) = store.unit(UnitKey::Study(id)).await? else {
+            return Ok(false);
+        };
+        let numbers = forgotten.clone();
+        // A long journal takes a while, and others are played meanwhile.
+        let forgetting = tokio::task::spawn_blocking(move || {
+            let mut changes = StoredStudy::decode(id, &stored)?.changes;
+            let mut is_changed = false;
+            for change in &mut changes {
+                if let Some(number) = change.number().filter(|it| numbers.contains(it)) {
+                    is_changed |= change.forget(number);
+                }
+            }
+            Ok::<_, StoreError>(is_changed.then(|| changes_to_bytes(&changes)))
+        });
+        let entries = (forgetting.await).map_err(|error| {
+            StoreError::Failed(format!("rewriting a journal failed: {error}"))
+        })??;
+        let Some(entries) = entries else {
+            return Ok(false);
+        };
+        let forgotten = forgotten.iter().copied().collect();
+        let rewrite = UnitWrite::Rewrite { entries, forgotten };
+        store.write_unit(UnitKey::Study(id), rewrite).await?;
+        self.unit.rows = 1;
+        Ok(true)
     }
 
     /// Since the task began, by a clock that never jumps.

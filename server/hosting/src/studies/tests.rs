@@ -586,6 +586,28 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     );
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_restart_reads_no_journal_again_for_data_that_were_deleted_before() {
+    let failing = Arc::new(FailingStore::after(u64::MAX));
+    let store: Arc<dyn Store> = Arc::clone(&failing) as Arc<dyn Store>;
+    let studies = server(&store);
+    let created = studies.create(settings(), None, Key::Local).await;
+    let (study, _) = created.expect("valid settings");
+    let added = study.add(Key::Local, named("Ada")).await;
+    assert_eq!(added, Ok(1));
+    assert_eq!(study.withdraw(1, true).await, Ok(()));
+    studies.end();
+    study.stopped().await;
+
+    let studies = server(&store);
+    assert_eq!(studies.restore().await, Ok(1));
+    let unreadable = failing.unreadable.lock();
+    unreadable.expect("no panic").insert(study.id().unit());
+    let study = studies.get(study.id()).expect("it is resumed");
+    let unknown = study.open(Key::Local, 99, None).await;
+    assert_eq!(unknown, Err(Refusal::Unknown.into()), "it runs");
+}
+
 /// Who imports a record under the id of a study's game adds nothing to the study's data.
 #[tokio::test]
 async fn a_record_from_elsewhere_is_no_data_of_a_study() {
