@@ -258,11 +258,15 @@ impl Reservation {
         if table.in_creation.contains_key(&owner.subject) {
             return Ok(Claim::InProgress);
         }
-        let place = rooms.places.try_take(charged);
-        let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
-        if !table.shutting_down && !rooms.is_reached() {
+        // First: closing a room of its own does not help a caller then.
+        if table.shutting_down {
+            return Err(CreateError::ShuttingDown);
+        }
+        if !rooms.is_reached() {
             return Err(CreateError::NotReached);
         }
+        let place = rooms.places.try_take(charged);
+        let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
         table.reserve(owner.subject, unit, rooms.max_rooms)?;
         drop(table);
         Ok(Claim::Reserved(Self {

@@ -167,3 +167,19 @@ async fn the_end_of_a_game_wakes_only_its_own_unit() {
     rooms.stop_notifying(unit, &next);
     assert!(!rooms.notifies(unit));
 }
+
+#[tokio::test]
+async fn who_creates_one_room_too_many_is_first_told_that_the_server_stops() {
+    let config = ServerConfig {
+        max_rooms: 1,
+        ..ServerConfig::default()
+    };
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(&config, store, TaskTracker::new()).expect("threads");
+    let _made = rooms.create(NewRoom::for_tests()).await.expect("a room");
+    let refused = rooms.create(NewRoom::for_tests()).await;
+    assert!(matches!(refused, Err(CreateError::Refused(_))));
+    rooms.refuse_new();
+    let refused = rooms.create(NewRoom::for_tests()).await;
+    assert!(matches!(refused, Err(CreateError::ShuttingDown)));
+}
