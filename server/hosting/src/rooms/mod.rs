@@ -8,7 +8,7 @@ mod table;
 mod tests;
 mod unit;
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
@@ -361,11 +361,7 @@ impl Rooms {
 
     /// Number of rooms in which a game is running or waiting to start.
     pub fn open_count(&self) -> usize {
-        self.lock()
-            .by_number
-            .values()
-            .filter(|entry| entry.is_open())
-            .count()
+        self.lock().open_count()
     }
 
     /// What lets this node publish; `None` in a single server.
@@ -436,7 +432,7 @@ impl Rooms {
     /// no game is open any more.
     pub async fn shut_down(&self, grace: Duration) {
         self.refuse_new();
-        let mut playing = HashSet::new();
+        let mut playing = Vec::new();
         for (handle, durable) in self.open() {
             let waits = match handle.describe().await {
                 Ok(room) => room.state() == chefshat_proto::v1::RoomState::Waiting,
@@ -445,21 +441,29 @@ impl Rooms {
             // Games that have not started are not waited for. Ephemeral ones are aborted at once;
             // agents of durable ones stay connected as long as the server runs.
             match (waits, durable) {
-                (false, _) => drop(playing.insert(handle.id())),
+                (false, _) => playing.push(handle.id()),
                 (true, false) => handle.end(durable).await,
                 (true, true) => {}
             }
         }
         // Both waits end: within the grace, or because every room obeys.
-        let over = self.until(|table| !table.any_open(|id| playing.contains(&id)));
+        let over = async {
+            for room in playing {
+                self.until_ended(room).await;
+            }
+        };
         let _ = tokio::time::timeout(grace, over).await;
         // Ephemeral games first: suspending a room ends streams on which other seats may still
         // receive the end of theirs.
         for durable in [false, true] {
-            for (handle, _) in self.open().into_iter().filter(|(_, it)| *it == durable) {
-                handle.end(durable).await;
+            let mut open = self.open();
+            open.retain(|(_, it)| *it == durable);
+            for (handle, durable) in &open {
+                handle.end(*durable).await;
             }
-            self.until(|table| !table.any_open_of(durable)).await;
+            for (handle, _) in &open {
+                self.until_ended(handle.id()).await;
+            }
         }
         // Dropping the handles ends the rooms that still show their games, and the tracker's tasks
         // with them.
@@ -472,6 +476,12 @@ impl Rooms {
             .filter(|entry| entry.is_open())
             .map(|entry| (entry.handle.clone(), entry.durable))
             .collect()
+    }
+
+    /// Waits until a room is not open any more.
+    async fn until_ended(&self, room: RoomId) {
+        self.until(|table| !table.get(room).is_some_and(Entry::is_open))
+            .await;
     }
 
     /// Waits until the table meets a condition.
@@ -501,24 +511,21 @@ struct Watcher(Weak<Rooms>);
 impl RoomWatcher for Watcher {
     fn game_over(&self, room: RoomId, end: GameEnd) {
         self.change(room, |table, number| {
-            let entry = table.by_number.get_mut(&number)?;
-            entry.over = true;
-            entry.end = Some(end);
-            entry.place = None;
-            table.waiting_for(number)
+            table.end(number, |entry| {
+                entry.over = true;
+                entry.end = Some(end);
+                entry.place = None;
+            })
         });
     }
 
     fn gone(&self, room: RoomId) {
         self.change(room, |table, number| {
-            match table.by_number.get_mut(&number) {
-                Some(entry) if !entry.over => entry.suspended = true,
-                _ => {
-                    table.remove(number);
-                    return None;
-                }
+            if table.by_number[&number].over {
+                table.remove(number);
+                return None;
             }
-            table.waiting_for(number)
+            table.end(number, |entry| entry.suspended = true)
         });
     }
 }

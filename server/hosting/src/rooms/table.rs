@@ -1,6 +1,6 @@
 //! The table of rooms, in the order of their creation, with look-up by id and join code.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -46,6 +46,10 @@ pub(super) struct Table {
     /// In the order of their creation.
     pub(super) by_number: BTreeMap<u64, Entry>,
     pub(super) numbers: HashMap<UnitId, u64>,
+    /// The rooms of each unit.
+    by_unit: HashMap<UnitId, BTreeSet<u64>>,
+    /// The rooms that are not open.
+    ended: BTreeSet<u64>,
     pub(super) codes: HashMap<String, u64>,
     /// The rooms of games, by the ids of the games.
     games: HashMap<GameId, u64>,
@@ -131,6 +135,17 @@ impl Table {
         self.numbers.get(&id.unit()).copied()
     }
 
+    /// The rooms of a unit, with their numbers.
+    pub(super) fn of_unit(&self, unit: UnitId) -> impl Iterator<Item = (u64, &Entry)> {
+        let numbers = self.by_unit.get(&unit).into_iter().flatten();
+        numbers.map(|number| (*number, &self.by_number[number]))
+    }
+
+    /// Number of rooms that wait or play.
+    pub(super) fn open_count(&self) -> usize {
+        self.by_number.len() - self.ended.len()
+    }
+
     /// Reserves space for a room that will be created.
     pub(super) fn reserve(
         &mut self,
@@ -138,15 +153,8 @@ impl Table {
         unit: UnitId,
         max_rooms: usize,
     ) -> Result<(), CreateError> {
-        if self.shutting_down {
-            return Err(CreateError::ShuttingDown);
-        }
-        let full = self.by_number.len() + self.in_creation.len() >= max_rooms;
-        if full {
-            let open = self.by_number.values().filter(|it| it.is_open()).count();
-            if open + self.in_creation.len() >= max_rooms {
-                return Err(CreateError::TooMany(max_rooms));
-            }
+        if self.open_count() + self.in_creation.len() >= max_rooms {
+            return Err(CreateError::TooMany(max_rooms));
         }
         self.in_creation.insert(id, unit);
         Ok(())
@@ -163,7 +171,23 @@ impl Table {
             self.codes.insert(code, number);
         }
         self.games.insert(entry.header.game_id, number);
+        (self.by_unit.entry(entry.header.unit()).or_default()).insert(number);
+        if !entry.is_open() {
+            self.ended.insert(number);
+        }
         self.by_number.insert(number, entry);
+    }
+
+    /// Changes a room so that it is not open any more. Returns what its unit's task waits on.
+    pub(super) fn end(
+        &mut self,
+        number: u64,
+        change: impl FnOnce(&mut Entry),
+    ) -> Option<Arc<Notify>> {
+        let entry = self.by_number.get_mut(&number)?;
+        change(entry);
+        self.ended.insert(number);
+        self.waiting.get(&entry.header.unit()).cloned()
     }
 
     /// The room of a game that is not over.
@@ -172,36 +196,13 @@ impl Table {
         (!entry.over).then_some(entry)
     }
 
-    /// What the task of the unit that a room is of waits on.
-    pub(super) fn waiting_for(&self, number: u64) -> Option<Arc<Notify>> {
-        let unit = self.by_number.get(&number)?.header.unit();
-        self.waiting.get(&unit).cloned()
-    }
-
     /// Removes ended rooms if their space is needed.
     pub(super) fn make_space(&mut self, max_rooms: usize) {
         while self.by_number.len() >= max_rooms
-            && let Some(number) = self
-                .by_number
-                .iter()
-                .find(|(_, entry)| !entry.is_open())
-                .map(|(number, _)| *number)
+            && let Some(number) = self.ended.first().copied()
         {
             self.remove(number);
         }
-    }
-
-    pub(super) fn any_open(&self, which: impl Fn(RoomId) -> bool) -> bool {
-        self.by_number
-            .values()
-            .any(|entry| entry.is_open() && which(entry.handle.id()))
-    }
-
-    /// Whether there is an open room of this durability.
-    pub(super) fn any_open_of(&self, durable: bool) -> bool {
-        self.by_number
-            .values()
-            .any(|entry| entry.is_open() && entry.durable == durable)
     }
 
     pub(super) fn remove_over(&mut self) {
@@ -217,6 +218,14 @@ impl Table {
     pub(super) fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
             self.numbers.remove(&entry.handle.id().unit());
+            self.ended.remove(&number);
+            let unit = entry.header.unit();
+            if let Some(rooms) = self.by_unit.get_mut(&unit) {
+                rooms.remove(&number);
+                if rooms.is_empty() {
+                    self.by_unit.remove(&unit);
+                }
+            }
             if self.games.get(&entry.header.game_id) == Some(&number) {
                 self.games.remove(&entry.header.game_id);
             }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use futures::FutureExt as _;
 
 use super::*;
+use chefshat_admission::limits::Shares;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{
     AbortReason, Change, Entry, Fill, ParticipantKind, SeatedParticipant,
@@ -166,6 +167,61 @@ async fn the_end_of_a_game_wakes_only_its_own_unit() {
     next.notified().await;
     rooms.stop_notifying(unit, &next);
     assert!(!rooms.notifies(unit));
+}
+
+/// What the table keeps for whom asks often is what a look at each room would find.
+fn check(rooms: &Rooms) {
+    let table = rooms.lock();
+    let entries = table.by_number.values();
+    let open = entries.clone().filter(|entry| entry.is_open()).count();
+    assert_eq!(table.open_count(), open);
+    for entry in entries {
+        let unit = entry.header.unit();
+        let is_of = |(_, entry): &(&u64, &super::table::Entry)| entry.header.unit() == unit;
+        let expected: Vec<u64> = (table.by_number.iter().filter(is_of))
+            .map(|(number, _)| *number)
+            .collect();
+        let found: Vec<u64> = table.of_unit(unit).map(|(number, _)| number).collect();
+        assert_eq!(found, expected);
+    }
+}
+
+#[tokio::test]
+async fn rooms_are_found_by_unit_and_counted_while_they_come_and_go() {
+    let config = ServerConfig {
+        max_rooms: 3,
+        shares: Shares::ALL,
+        ..ServerConfig::default()
+    };
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(&config, store, TaskTracker::new()).expect("threads");
+    let create = async || {
+        let created = rooms.create(NewRoom::for_tests()).await;
+        check(&rooms);
+        created
+    };
+    let mut made = Vec::new();
+    for _ in 0..3 {
+        made.push(create().await.expect("a room").handle);
+    }
+    assert!(create().await.is_err(), "it is full");
+    for ending in [&made[0], &made[2]] {
+        ending.close_without_token().await;
+        rooms.until_ended(ending.id()).await;
+    }
+    check(&rooms);
+    assert_eq!(rooms.open_count(), 1);
+    // Those that are over make space, the oldest first.
+    create().await.expect("a room");
+    assert!(rooms.get(made[0].id()).is_none() && rooms.get(made[2].id()).is_some());
+    rooms.stop_unit(made[1].id().unit()).await;
+    check(&rooms);
+    assert!(rooms.get(made[1].id()).is_none());
+    assert_eq!(rooms.open_count(), 1);
+    create().await.expect("a room");
+    rooms.shut_down(Duration::ZERO).await;
+    check(&rooms);
+    assert_eq!(rooms.open_count(), 0);
 }
 
 #[tokio::test]

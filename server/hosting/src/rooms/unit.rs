@@ -7,7 +7,7 @@ use std::future::Future;
 use chefshat_cluster::Load;
 use chefshat_proto::v1::RoomState;
 
-use super::{Rooms, Table};
+use super::Rooms;
 use crate::room::Handle;
 use chefshat_room::ids::UnitId;
 
@@ -94,11 +94,13 @@ impl Rooms {
         end: impl Fn(Handle, bool) -> F,
     ) {
         self.until_created(unit).await;
-        for (handle, durable) in self.open_of(unit) {
-            end(handle, durable).await;
+        let open = self.open_of(unit);
+        for (handle, durable) in &open {
+            end(handle.clone(), *durable).await;
         }
-        self.until(|table| !table.of_unit(unit).any(|(_, entry)| entry.is_open()))
-            .await;
+        for (handle, _) in &open {
+            self.until_ended(handle.id()).await;
+        }
         let mut table = self.lock();
         let suspended = table.of_unit(unit).filter(|(_, entry)| entry.suspended);
         let suspended: Vec<u64> = suspended.map(|(number, _)| number).collect();
@@ -118,20 +120,11 @@ impl Rooms {
         }
     }
 
-    fn open_of(&self, unit: UnitId) -> Vec<(Handle, bool)> {
+    /// The rooms of a unit whose games are not over, and whether they are durable.
+    pub(crate) fn open_of(&self, unit: UnitId) -> Vec<(Handle, bool)> {
         let table = self.lock();
         let open = table.of_unit(unit).filter(|(_, entry)| entry.is_open());
         open.map(|(_, entry)| (entry.handle.clone(), entry.durable))
             .collect()
-    }
-}
-
-impl Table {
-    /// The rooms of a unit, with their numbers.
-    fn of_unit(&self, unit: UnitId) -> impl Iterator<Item = (u64, &super::Entry)> {
-        let entries = self.by_number.iter();
-        entries
-            .filter(move |(_, entry)| entry.header.unit() == unit)
-            .map(|(number, entry)| (*number, entry))
     }
 }

@@ -15,7 +15,7 @@ use crate::journaled::{Handle, Stopped};
 use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::access::{Relation, Secrets};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
+use chefshat_room::ids::{Id, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
 use chefshat_wire::convert;
@@ -255,17 +255,10 @@ impl TournamentHandle {
     /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just
     /// before the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
-        let placed: Vec<RoomId> = (self.committed().placed.values())
-            .map(|(room, _)| *room)
-            .collect();
-        for room in placed {
-            if rooms.is_over(room) == Some(false)
-                && let Some(room) = rooms.get(room)
-            {
-                tokio::spawn(short("one message", async move {
-                    room.close_without_token().await
-                }));
-            }
+        for (room, _) in rooms.open_of(self.id().unit()) {
+            tokio::spawn(short("one message", async move {
+                room.close_without_token().await
+            }));
         }
     }
 
