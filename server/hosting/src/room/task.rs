@@ -127,14 +127,17 @@ pub enum GameEnd {
     Aborted(AbortReason),
     /// It was aborted before the deal, and has no record.
     NotDealt,
+    /// Its room has failed, by a fault of the server.
+    Failed,
 }
 
 /// Maintains the list of rooms.
 pub trait RoomWatcher: Send + Sync {
     /// The game of a room has ended; the room is still listed.
     fn game_over(&self, room: RoomId, end: GameEnd);
-    /// The room is gone.
-    fn gone(&self, room: RoomId);
+    /// The room is gone. `has_failed`: before its game was over, and nobody resumes it before the
+    /// server is restarted.
+    fn gone(&self, room: RoomId, has_failed: bool);
 }
 
 /// Spawns the task of a room and returns the sender of its mailbox and where readers share it.
@@ -548,7 +551,9 @@ impl Drop for Room {
     fn drop(&mut self) {
         self.end_streams(StreamEnd::RoomGone);
         let header = self.core.header();
-        self.context.watcher.gone(header.room_id);
+        // A node of a cluster resumes it.
+        let has_failed = std::thread::panicking() && self.context.lease.is_none();
+        self.context.watcher.gone(header.room_id, has_failed);
         let is_expected = self.suspended || self.fence.is_cancelled();
         if let Some(lease) = &self.context.lease
             && !is_expected

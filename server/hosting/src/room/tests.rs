@@ -41,7 +41,7 @@ struct NullWatcher;
 
 impl RoomWatcher for NullWatcher {
     fn game_over(&self, _room: RoomId, _end: GameEnd) {}
-    fn gone(&self, _room: RoomId) {}
+    fn gone(&self, _room: RoomId, _has_failed: bool) {}
 }
 
 /// The owner's secret.

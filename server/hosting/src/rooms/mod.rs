@@ -276,9 +276,13 @@ impl Rooms {
         self.room_of(game).is_some()
     }
 
-    /// Whether a room has stopped before its game is over.
-    pub fn is_suspended(&self, id: RoomId) -> bool {
-        self.lock().get(id).is_some_and(|entry| entry.suspended)
+    /// Whether a game of a unit is not over: its room plays, or has stopped and will be resumed, in a
+    /// cluster perhaps by another node.
+    pub(crate) fn is_unfinished(&self, id: RoomId) -> bool {
+        let table = self.lock();
+        table
+            .get(id)
+            .is_some_and(|entry| !entry.over && entry.end.is_none())
     }
 
     /// Whether the game of a room is over; `None` if the room is unknown or suspended.
@@ -519,13 +523,19 @@ impl RoomWatcher for Watcher {
         });
     }
 
-    fn gone(&self, room: RoomId) {
+    fn gone(&self, room: RoomId, has_failed: bool) {
         self.change(room, |table, number| {
             if table.by_number[&number].over {
                 table.remove(number);
                 return None;
             }
-            table.end(number, |entry| entry.suspended = true)
+            table.end(number, |entry| {
+                entry.suspended = true;
+                if has_failed {
+                    entry.end = Some(GameEnd::Failed);
+                    entry.place = None;
+                }
+            })
         });
     }
 }

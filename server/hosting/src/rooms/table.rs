@@ -106,8 +106,8 @@ pub(super) struct Entry {
     pub(super) over: bool,
     /// How it has ended, if it did so since the server was started.
     pub(super) end: Option<GameEnd>,
-    /// The room has ended but its game resumes when the server is restarted. It stays in the table,
-    /// so that clients are asked to try again: the room is not unknown.
+    /// The room has ended but its game resumes when the server is restarted, or the room has failed.
+    /// It stays in the table, so that clients are asked to try again: the room is not unknown.
     pub(super) suspended: bool,
     /// Whether lists show it.
     pub(super) listed: bool,

@@ -239,3 +239,24 @@ async fn who_creates_one_room_too_many_is_first_told_that_the_server_stops() {
     let refused = rooms.create(NewRoom::for_tests()).await;
     assert!(matches!(refused, Err(CreateError::ShuttingDown)));
 }
+
+#[tokio::test]
+async fn a_room_that_fails_takes_no_place_and_its_unit_learns_of_it() {
+    let store = Arc::new(FailingStore::after(u64::MAX));
+    let panics = Arc::clone(&store.journals_panic);
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let handle = (rooms.create(NewRoom::for_tests()).await)
+        .expect("a room")
+        .handle;
+    let room = handle.id();
+    let woken = rooms.notify_of_games(room.unit());
+    assert!(rooms.is_unfinished(room));
+    assert_eq!(rooms.places.taken(), 1);
+    panics.store(true, std::sync::atomic::Ordering::Relaxed);
+    handle.close_without_token().await;
+    woken.notified().await;
+    assert!(matches!(rooms.end_of(room), Some(GameEnd::Failed)));
+    assert!(!rooms.is_unfinished(room));
+    assert_eq!((rooms.places.taken(), rooms.open_count()), (0, 0));
+    check(&rooms);
+}

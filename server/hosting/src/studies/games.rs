@@ -58,7 +58,7 @@ impl StudyTask {
                 continue;
             }
             let room = convert::room_of(&game.placed);
-            if self.unit.rooms.is_over(room) == Some(false) || self.unit.rooms.is_suspended(room) {
+            if self.unit.rooms.is_unfinished(room) {
                 continue;
             }
             match self.outcome(&game).await? {
@@ -89,11 +89,10 @@ impl StudyTask {
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
-        if let Some(end) = self.unit.rooms.end_of(convert::room_of(&game.placed)) {
-            return Ok(Some(match end {
-                GameEnd::Finished(_) => Outcome::Finished,
-                GameEnd::Aborted(_) | GameEnd::NotDealt => Outcome::Aborted,
-            }));
+        match self.unit.rooms.end_of(convert::room_of(&game.placed)) {
+            Some(GameEnd::Finished(_)) => return Ok(Some(Outcome::Finished)),
+            Some(GameEnd::Aborted(_) | GameEnd::NotDealt) => return Ok(Some(Outcome::Aborted)),
+            Some(GameEnd::Failed) | None => {}
         }
         let read = |stored| match stored {
             StoredGame::Hosted(_, entries, _) => {

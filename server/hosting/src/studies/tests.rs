@@ -313,6 +313,29 @@ async fn a_game_that_cannot_be_read_back_ends_no_study() {
     assert_eq!(outcome(), Some(chefshat_study::Outcome::Aborted));
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_game_whose_room_fails_ends() {
+    let failing = Arc::new(FailingStore::after(u64::MAX));
+    let store: Arc<dyn Store> = Arc::clone(&failing) as Arc<dyn Store>;
+    let studies = server(&store);
+    let created = studies.create(settings(), None, Key::Local).await;
+    let (study, _) = created.expect("valid settings");
+    let added = study.add(Key::Local, NewParticipants::numbered(1)).await;
+    assert_eq!(added, Ok(1));
+    let lab = Lab {
+        store,
+        studies,
+        study,
+    };
+    let _present = lab.begin().await;
+    let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
+    let room = lab.studies.rooms().get(convert::room_of(&game));
+    failing.journals_panic.store(true, Ordering::Relaxed);
+    room.expect("it waits").close_without_token().await;
+    let deleted = lab.studies.delete(Arc::clone(&lab.study), true).await;
+    assert_eq!(deleted, Ok((1, 1)));
+}
+
 /// What is in the store twice is run once.
 #[tokio::test(start_paused = true)]
 async fn a_study_that_runs_is_not_resumed_beside_itself() {

@@ -53,12 +53,8 @@ impl TournamentTask {
                 self.place(game);
                 continue;
             };
-            if self.unit.rooms.is_over(room) == Some(false) {
+            if self.unit.rooms.is_unfinished(room) {
                 self.seen.insert(game);
-                continue;
-            }
-            if self.unit.rooms.lease().is_some() && self.unit.rooms.is_suspended(room) {
-                // It has stopped, and the tournament will be: this node does not own it any more.
                 continue;
             }
             match self.ended(game, room, game_id).await? {
@@ -88,6 +84,11 @@ impl TournamentTask {
                 Ok((reason != AbortReason::Shutdown).then_some(Ended::Aborted))
             }
             Some(GameEnd::NotDealt) => Ok(self.without_deal(game, room).await),
+            // Its cards have been seen: they are not dealt again.
+            Some(GameEnd::Failed) => {
+                let ended = self.ended_as_stored(game, room, game_id).await?;
+                Ok(ended.or(Some(Ended::Aborted)))
+            }
             // Its record could not be read when it ended, or the server was restarted since.
             Some(GameEnd::Finished(None)) | None => self.ended_as_stored(game, room, game_id).await,
         }

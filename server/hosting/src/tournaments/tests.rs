@@ -321,6 +321,15 @@ async fn it_starts_at_its_time_although_the_clock_was_set_meanwhile() {
     assert_ne!(handle.read(Tournament::state), State::Open);
 }
 
+/// The cards of a game whose room has failed are not dealt again.
+#[tokio::test(start_paused = true)]
+async fn games_whose_rooms_fail_are_voided() {
+    let store = Arc::new(FailingStore::after(u64::MAX));
+    store.journals_panic.store(true, Ordering::Relaxed);
+    let (_, games) = played(&store).await;
+    assert_eq!(games, [GameState::Void]);
+}
+
 #[tokio::test]
 async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
     let folder = tempfile::tempdir().expect("a folder");
