@@ -9,7 +9,8 @@ use chefshat_proto::v1::RoomState;
 
 use super::Rooms;
 use crate::room::Handle;
-use chefshat_room::ids::UnitId;
+use chefshat_base::tasks::short;
+use chefshat_room::ids::{RoomId, UnitId};
 
 impl Rooms {
     /// Whether the room that is this unit runs here, or is being created.
@@ -120,8 +121,18 @@ impl Rooms {
         }
     }
 
+    /// Closes the rooms of a unit but these.
+    pub(crate) fn close_all_but(&self, unit: UnitId, kept: &BTreeSet<RoomId>) {
+        for (room, _) in self.open_of(unit) {
+            if !kept.contains(&room.id()) {
+                let closing = async move { room.close_without_token().await };
+                tokio::spawn(short("one message", closing));
+            }
+        }
+    }
+
     /// The rooms of a unit whose games are not over, and whether they are durable.
-    pub(crate) fn open_of(&self, unit: UnitId) -> Vec<(Handle, bool)> {
+    fn open_of(&self, unit: UnitId) -> Vec<(Handle, bool)> {
         let table = self.lock();
         let open = table.of_unit(unit).filter(|(_, entry)| entry.is_open());
         open.map(|(_, entry)| (entry.handle.clone(), entry.durable))

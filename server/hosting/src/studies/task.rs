@@ -13,7 +13,8 @@ use super::data::{RETRY_STUDIES, StudyData, memory_of};
 use super::message::{Command, Message, NotDeleted};
 use super::state::{Budgets, StudyShared};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
-use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
+use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::TimeOfDay;
 use chefshat_base::tasks::LongTask;
@@ -128,6 +129,16 @@ impl Journaled for StudyTask {
     /// Its participants' data can still be deleted.
     fn is_over(_: &Study) -> bool {
         false
+    }
+
+    /// Closes a room that failed and was resumed: its game counts as broken off.
+    fn enter(handle: &Handle<Self>, rooms: &Arc<Rooms>) {
+        let needed = handle.read(|study| {
+            let games = study.participants().values().flat_map(|it| &it.games);
+            let running = games.filter(|game| game.ended.is_none());
+            running.map(|game| convert::room_of(&game.placed)).collect()
+        });
+        rooms.close_all_but(handle.id().unit(), &needed);
     }
 
     fn new(unit: Unit<Self>, common: &Budgets) -> Self {

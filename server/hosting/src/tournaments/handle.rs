@@ -14,8 +14,7 @@ use super::task::TournamentTask;
 use crate::journaled::{Handle, Stopped};
 use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::access::{Relation, Secrets};
-use chefshat_base::tasks::short;
-use chefshat_room::ids::{Id, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
+use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
 use chefshat_wire::convert;
@@ -252,14 +251,16 @@ impl TournamentHandle {
         read(&self.committed().core)
     }
 
-    /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just
-    /// before the server ended.
+    /// Closes the rooms that the tournament does not need: those of running games if it is over,
+    /// perhaps since just before the server ended, and one that failed and was resumed.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
-        for (room, _) in rooms.open_of(self.id().unit()) {
-            tokio::spawn(short("one message", async move {
-                room.close_without_token().await
-            }));
-        }
+        let needed: BTreeSet<RoomId> = {
+            let state = self.committed();
+            let running = (state.core.playing()).filter(|_| !state.core.state().is_over());
+            let placed = running.filter_map(|game| state.placed.get(&game));
+            placed.map(|(room, _)| *room).collect()
+        };
+        rooms.close_all_but(self.id().unit(), &needed);
     }
 
     /// Withholds the records of these deals that are still to be played, and releases the others.

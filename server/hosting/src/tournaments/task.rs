@@ -140,14 +140,12 @@ impl Journaled for TournamentTask {
         state.core.state().is_over()
     }
 
-    /// Withholds records that clients could request otherwise, and closes what still runs of a
-    /// tournament that is over.
+    /// Withholds records that clients could request otherwise, and closes what still runs and is not
+    /// needed.
     fn enter(handle: &Handle<Self>, rooms: &Arc<Rooms>) {
         let deals = handle.committed().deals();
         handle.withhold(&deals, rooms);
-        if handle.is_over() {
-            handle.close_rooms(rooms);
-        }
+        handle.close_rooms(rooms);
     }
 
     fn new(unit: Unit<Self>, common: &Common) -> Self {

@@ -8,7 +8,7 @@ use futures::FutureExt as _;
 use super::*;
 use crate::config::{MAX_TOURNAMENTS, ServerConfig};
 use chefshat_admission::limits::Key;
-use chefshat_room::ids::{GameId, TournamentId, TournamentToken};
+use chefshat_room::ids::{GameId, RoomId, TournamentId, TournamentToken};
 use chefshat_store::testing::{FailingStore, TypedUnits as _};
 use chefshat_store::{SqliteStore, Store};
 use chefshat_tournament::{ByHandProblem, GameState};
@@ -328,6 +328,37 @@ async fn games_whose_rooms_fail_are_voided() {
     store.journals_panic.store(true, Ordering::Relaxed);
     let (_, games) = played(&store).await;
     assert_eq!(games, [GameState::Void]);
+}
+
+/// A room that has failed is resumed with the server, although its game counts as broken off.
+#[tokio::test]
+async fn rooms_that_no_running_game_has_are_closed() {
+    use crate::rooms::{NewRoom, PartOf, Seating};
+    let tournaments = in_memory();
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
+    let (handle, _) = created.expect("made");
+    let game = chefshat_room::journal::TournamentGame {
+        tournament: handle.id(),
+        series: None,
+    };
+    let room = RoomId::random();
+    let new = NewRoom {
+        seating: Some(Seating {
+            part_of: PartOf::Tournament(game),
+            owner: handle.room_owner(room),
+            game_id: GameId::random(),
+            participants: Default::default(),
+            server_seed: None,
+        }),
+        ..NewRoom::for_tests()
+    };
+    let rooms = tournaments.rooms();
+    rooms.create(new).await.expect("a room");
+    let closed = rooms.notify_of_games(handle.id().unit());
+    handle.close_rooms(rooms);
+    closed.notified().await;
+    assert_eq!(rooms.is_over(room), Some(true));
 }
 
 #[tokio::test]
