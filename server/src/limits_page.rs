@@ -304,6 +304,13 @@ fn of_each() -> String {
             ),
         ),
         (
+            "headers of a request",
+            format!(
+                "{} KiB; of HTTP/1.1, the connection is closed beyond",
+                frames::MAX_HEADER_BYTES >> 10
+            ),
+        ),
+        (
             "TLS handshakes",
             format!(
                 "{}; one that fails or is abandoned counts as {}",

@@ -43,6 +43,7 @@ use crate::forwarded::ForwardedLayer;
 use crate::grpc;
 use crate::handshakes::Handshakes;
 use crate::limits::{CallLimits, Metered};
+use crate::limits::frames::MAX_HEADER_BYTES;
 use crate::metrics::Metrics;
 use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
@@ -62,8 +63,6 @@ use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
 use crate::wire::peer::peer_service_server::PeerServiceServer;
 
-/// Largest request headers, bytes.
-const MAX_HEADER_BYTES: u32 = 16 * 1024;
 /// Most bytes of a client that wait on one stream to be read.
 const CLIENT_STREAM_WINDOW: u32 = 256 * 1024;
 /// Most bytes that wait on all streams of a connection: one that is not read leaves most of them to

@@ -1,6 +1,8 @@
 //! Drops connections whose protocol stays unknown, and slows down those that send frames of HTTP/2
 //! which cost work and carry nothing: PING, SETTINGS, PRIORITY, RST_STREAM and frames of unknown
 //! types. The transport answers them without limit. Requests and data are not slowed down here.
+//! Drops connections of HTTP/1.1 with headers that are too long: there, the transport has no setting
+//! for it.
 
 use std::io;
 use std::pin::Pin;
@@ -11,6 +13,10 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep};
 use tonic::transport::server::Connected;
 
+/// Largest headers of a request, bytes.
+pub const MAX_HEADER_BYTES: u32 = 16 * 1024;
+/// Most headers of a request of HTTP/1.1: the transport refuses more.
+const MAX_HEADERS: usize = 100;
 /// Control frames that a connection may send in a second.
 pub const PER_SECOND: u32 = 1_000;
 /// Control frames that it may send at once.
@@ -55,18 +61,24 @@ enum Position {
         read: usize,
         skip: usize,
     },
-    /// Not read: another protocol, or a connection of a trusted peer.
+    /// In requests of HTTP/1.1.
+    Http1(Http1),
+    /// Not read: a connection of a trusted peer.
     Other,
 }
 
 impl Position {
-    /// Reads bytes; returns the cost of the frames that begin in them, in window updates.
-    fn advance(&mut self, mut bytes: &[u8]) -> u32 {
+    /// Reads bytes; returns the cost of the frames that begin in them, in window updates, or `None` if
+    /// the headers of a request are too long.
+    fn advance(&mut self, mut bytes: &[u8]) -> Option<u32> {
         if let Self::Preface(read) = self {
             let length = bytes.len().min(PREFACE.len() - *read);
             if bytes[..length] != PREFACE[*read..*read + length] {
-                *self = Self::Other;
-                return 0;
+                *self = Self::Http1(Http1 {
+                    read: PREFACE[..*read].to_vec(),
+                    ..Http1::default()
+                });
+                return self.advance(bytes);
             }
             *read += length;
             bytes = &bytes[length..];
@@ -78,8 +90,12 @@ impl Position {
                 };
             }
         }
-        let Self::Frames { header, read, skip } = self else {
-            return 0;
+        let (header, read, skip) = match self {
+            Self::Frames { header, read, skip } => (header, read, skip),
+            Self::Http1(requests) => {
+                return requests.advance(bytes).then_some(0);
+            }
+            Self::Preface(_) | Self::Other => return Some(0),
         };
         let mut cost = 0;
         while !bytes.is_empty() {
@@ -103,7 +119,97 @@ impl Position {
                 };
             }
         }
-        cost
+        Some(cost)
+    }
+}
+
+/// Where the bytes of a connection of HTTP/1.1 are.
+#[derive(Debug, Default)]
+struct Http1 {
+    part: Part,
+    /// What was read of it.
+    read: Vec<u8>,
+    /// Bytes of a body before it.
+    skip: u64,
+}
+
+/// A part of a request that ends with a line.
+#[derive(Debug, Default, Clone, Copy)]
+enum Part {
+    /// The first line and the headers.
+    #[default]
+    Head,
+    /// The size of a chunk of its body.
+    ChunkSize,
+    /// The empty line after a chunk.
+    ChunkEnd,
+    /// The headers after the last chunk.
+    Trailers,
+}
+
+impl Http1 {
+    /// Reads bytes; returns whether the headers in them are short enough.
+    fn advance(&mut self, mut bytes: &[u8]) -> bool {
+        while !bytes.is_empty() {
+            let skipped = usize::try_from(self.skip).map_or(bytes.len(), |it| it.min(bytes.len()));
+            self.skip -= skipped as u64;
+            bytes = &bytes[skipped..];
+            let line = bytes.iter().position(|byte| *byte == b'\n');
+            let length = line.map_or(bytes.len(), |end| end + 1);
+            if self.read.len() + length > MAX_HEADER_BYTES as usize {
+                return false;
+            }
+            self.read.extend_from_slice(&bytes[..length]);
+            bytes = &bytes[length..];
+            if line.is_some() {
+                self.end_line();
+            }
+        }
+        true
+    }
+
+    /// Ends a line. After one that it refuses, the transport answers and reads no further request.
+    fn end_line(&mut self) {
+        let is_end = [&b"\n\n"[..], b"\n\r\n"]
+            .iter()
+            .any(|end| self.read.ends_with(end));
+        let is_empty = matches!(&self.read[..], b"\n" | b"\r\n");
+        self.part = match self.part {
+            Part::Head if !is_end => return,
+            Part::Head => {
+                // As the transport reads them.
+                let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+                let mut request = httparse::Request::new(&mut headers);
+                // Empty lines before a request.
+                if let Ok(httparse::Status::Partial) = request.parse(&self.read) {
+                    return;
+                }
+                let named = |name: &str| {
+                    let named = |it: &&httparse::Header<'_>| it.name.eq_ignore_ascii_case(name);
+                    request.headers.iter().find(named).map(|it| it.value)
+                };
+                let length = named("content-length").and_then(|it| std::str::from_utf8(it).ok());
+                match named("transfer-encoding") {
+                    Some(_) => Part::ChunkSize,
+                    None => {
+                        self.skip = length.and_then(|it| it.parse().ok()).unwrap_or(0);
+                        Part::Head
+                    }
+                }
+            }
+            Part::ChunkSize => match httparse::parse_chunk_size(&self.read) {
+                Ok(httparse::Status::Complete((_, 0))) => Part::Trailers,
+                Ok(httparse::Status::Complete((_, size))) => {
+                    self.skip = size;
+                    Part::ChunkEnd
+                }
+                _ => Part::Head,
+            },
+            Part::ChunkEnd => Part::ChunkSize,
+            Part::Trailers if is_empty || is_end => Part::Head,
+            Part::Trailers => return,
+        };
+        self.read.clear();
     }
 }
 
@@ -172,9 +278,10 @@ impl<S: AsyncRead + Unpin> AsyncRead for Metered<S> {
                 return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
             }
         }
-        let cost = this.position.advance(&buffer.filled()[before..]);
-        if cost > 0 {
-            this.charge(cost);
+        match this.position.advance(&buffer.filled()[before..]) {
+            None => return Poll::Ready(Err(io::ErrorKind::InvalidData.into())),
+            Some(0) => {}
+            Some(cost) => this.charge(cost),
         }
         read
     }
@@ -231,12 +338,54 @@ mod tests {
         let expected = 3 * WINDOW_UPDATES + 1;
         for size in [1, 2, 7, 64, 1_000] {
             let mut position = Position::Preface(0);
-            let cost: u32 = bytes.chunks(size).map(|part| position.advance(part)).sum();
-            assert_eq!(cost, expected, "in parts of {size} bytes");
+            let cost: Option<u32> = bytes.chunks(size).map(|part| position.advance(part)).sum();
+            assert_eq!(cost, Some(expected), "in parts of {size} bytes");
         }
         let mut other = Position::Preface(0);
-        assert_eq!(other.advance(b"POST / HTTP/1.1\r\n"), 0);
-        assert_eq!(other.advance(&frame(6, 8)), 0, "not HTTP/2");
+        assert_eq!(other.advance(b"POST / HTTP/1.1\r\n"), Some(0));
+        assert_eq!(other.advance(&frame(6, 8)), Some(0), "not HTTP/2");
+    }
+
+    #[test]
+    fn headers_of_http_1_have_a_limit_and_bodies_have_none() {
+        let long = "a".repeat(2 * MAX_HEADER_BYTES as usize);
+        let size = long.len();
+        let requests = [
+            "\r\nPUT / HTTP/1.1\r\nHost: here\r\n\r\n".to_owned(),
+            format!("POST / HTTP/1.1\r\nContent-LENGTH: {size}\r\n\r\n{long}"),
+            format!(
+                "POST / HTTP/1.1\r\ntransfer-encoding: chunked\r\n\r\n{size:x};a=b\r\n{long}\r\n"
+            ),
+            "1\r\n\n\r\n0\r\nafter: it\r\n\r\nGET / HTTP/1.1\n\n".to_owned(),
+        ];
+        let requests = requests.concat();
+        let head = format!("GET / HTTP/1.1\r\na: {long}");
+        for size in [1, 2, 7, 1_000, usize::MAX] {
+            let read = |bytes: &str| {
+                let mut position = Position::Preface(0);
+                let read: Option<u32> = (bytes.as_bytes().chunks(size))
+                    .map(|part| position.advance(part))
+                    .sum();
+                (read, position)
+            };
+            let (all, position) = read(&requests);
+            assert_eq!(all, Some(0), "in parts of {size} bytes");
+            let Position::Http1(Http1 {
+                part: Part::Head,
+                read: left,
+                skip: 0,
+            }) = position
+            else {
+                panic!("{position:?} in parts of {size} bytes");
+            };
+            assert!(left.is_empty());
+            assert_eq!(read(&head).0, None, "in parts of {size} bytes");
+            assert_eq!(
+                read(&format!("{requests}{head}")).0,
+                None,
+                "a later request"
+            );
+        }
     }
 
     #[tokio::test(start_paused = true)]
