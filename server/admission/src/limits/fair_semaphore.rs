@@ -246,7 +246,7 @@ impl Drop for Waiting<'_> {
             state.turns.retain(|key| *key != self.key);
         }
         // Others may have waited behind it.
-        let granted = match gave_up && state.reserved {
+        let granted = match gave_up {
             true => self.places.grant_all(&mut state),
             false => Vec::new(),
         };
@@ -385,3 +385,15 @@ mod tests {
         assert_eq!(places.taken(), 0);
     }
 }
+    #[tokio::test]
+    async fn one_that_gives_up_lets_smaller_requests_of_its_caller_pass() {
+        let places = FairSemaphore::new(20, SHARES);
+        let _held = places.try_take_many(key(1), 5).expect("free");
+        let mut large = Box::pin(places.take_many(key(1), 8));
+        assert!((&mut large).now_or_never().is_none(), "beyond its share");
+        let mut small = Box::pin(places.take_many(key(1), 2));
+        assert!((&mut small).now_or_never().is_none(), "it waits behind");
+        drop(large);
+        assert!((&mut small).now_or_never().is_some());
+    }
+
