@@ -1,6 +1,7 @@
 //! A limited number of permits, shared by all callers: nobody has more than its share, and those
 //! that wait get the next free permit in turns, one caller after another.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
@@ -25,6 +26,8 @@ struct State {
     taken: usize,
     /// Callers that have permits or wait for one.
     callers: HashMap<Key, Caller>,
+    /// Permits of the networks of one site of IPv6 together, if they have any.
+    sites: HashMap<Key, usize>,
     /// Callers that wait, in the order of their next turn.
     turns: VecDeque<Key>,
     /// Number of the next one that waits.
@@ -139,12 +142,22 @@ impl FairSemaphore {
 
     fn has_share(&self, state: &State, key: Key, count: usize) -> bool {
         let own = state.callers.get(&key).map_or(0, |caller| caller.taken);
-        own + count <= self.share_of(key)
+        let has_site = || {
+            let Some(site) = key.site_of_networks() else {
+                return true;
+            };
+            let of_site = state.sites.get(&site).copied().unwrap_or(0);
+            of_site + count <= self.shares.of_addresses().of(site, self.total)
+        };
+        own + count <= self.share_of(key) && has_site()
     }
 
     fn hold(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Permit {
         state.taken += count;
         state.callers.entry(key).or_default().taken += count;
+        if let Some(site) = key.site_of_networks() {
+            *state.sites.entry(site).or_default() += count;
+        }
         Permit {
             places: Arc::clone(self),
             key,
@@ -184,6 +197,14 @@ impl FairSemaphore {
         state.taken -= count;
         if let Some(caller) = state.callers.get_mut(&key) {
             caller.taken -= count;
+        }
+        if let Some(site) = key.site_of_networks()
+            && let Entry::Occupied(mut taken) = state.sites.entry(site)
+        {
+            *taken.get_mut() -= count;
+            if *taken.get() == 0 {
+                taken.remove();
+            }
         }
         let granted = self.grant_all(&mut state);
         state.forget_idle(key);
@@ -289,6 +310,29 @@ mod tests {
     }
 
     #[test]
+    fn the_networks_of_a_site_leave_half_to_others() {
+        let shares = Shares {
+            local: 50,
+            remote: 10,
+        };
+        let places = FairSemaphore::new(100, shares);
+        let network = |site: u16, number: u16| {
+            let address = [0x2001, 0xdb8, site, number, 0, 0, 0, 1];
+            Key::of_address(Some(std::net::IpAddr::from(address)))
+        };
+        let mut taken: Vec<_> = (0..20)
+            .filter_map(|number| places.try_take_many(network(1, number), 10))
+            .collect();
+        assert_eq!(places.taken(), 50);
+        assert!(places.try_take(network(1, 30)).is_none());
+        let _other = places.try_take(network(2, 0)).expect("another site");
+        taken.pop();
+        assert!(places.try_take(network(1, 30)).is_some());
+        drop(taken);
+        assert_eq!(places.lock().sites.len(), 1);
+    }
+
+    #[test]
     fn several_places_are_taken_together_or_not_at_all() {
         let places = FairSemaphore::new(8, SHARES);
         let first = places.try_take_many(key(1), 3).expect("free");
@@ -353,6 +397,18 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn one_that_gives_up_lets_smaller_requests_of_its_caller_pass() {
+        let places = FairSemaphore::new(20, SHARES);
+        let _held = places.try_take_many(key(1), 5).expect("free");
+        let mut large = Box::pin(places.take_many(key(1), 8));
+        assert!((&mut large).now_or_never().is_none(), "beyond its share");
+        let mut small = Box::pin(places.take_many(key(1), 2));
+        assert!((&mut small).now_or_never().is_none(), "it waits behind");
+        drop(large);
+        assert!((&mut small).now_or_never().is_some());
+    }
+
+    #[tokio::test]
     async fn those_that_wait_get_places_in_turns() {
         let places = FairSemaphore::new(1, SHARES);
         let held = places.try_take(key(1)).expect("free");
@@ -385,15 +441,3 @@ mod tests {
         assert_eq!(places.taken(), 0);
     }
 }
-    #[tokio::test]
-    async fn one_that_gives_up_lets_smaller_requests_of_its_caller_pass() {
-        let places = FairSemaphore::new(20, SHARES);
-        let _held = places.try_take_many(key(1), 5).expect("free");
-        let mut large = Box::pin(places.take_many(key(1), 8));
-        assert!((&mut large).now_or_never().is_none(), "beyond its share");
-        let mut small = Box::pin(places.take_many(key(1), 2));
-        assert!((&mut small).now_or_never().is_none(), "it waits behind");
-        drop(large);
-        assert!((&mut small).now_or_never().is_some());
-    }
-

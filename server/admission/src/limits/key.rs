@@ -47,7 +47,8 @@ impl Key {
         }
     }
 
-    /// The key under which wrong join codes count: a site often has 65,536 networks of IPv6 (/48).
+    /// The key of its site, under which wrong join codes count: a site often has 65,536 networks of
+    /// IPv6 (/48).
     pub fn site(self) -> Self {
         match self {
             Self::Address(IpAddr::V6(network)) if !network.is_loopback() => {
@@ -56,6 +57,13 @@ impl Key {
             }
             key => key,
         }
+    }
+
+    /// The site of a network of IPv6, whose networks share what one of them may not have alone.
+    pub(super) fn site_of_networks(self) -> Option<Self> {
+        let is_network =
+            matches!(self, Self::Address(IpAddr::V6(network)) if !network.is_loopback());
+        is_network.then(|| self.site())
     }
 
     /// Whether these callers run on the server's machine, or their work is the server's own.
@@ -128,7 +136,7 @@ impl Shares {
         remote: 100,
     };
 
-    /// For the tokens of one address together: half, as for the server's machine, or more.
+    /// For the tokens of one address, or the networks of one site, together: half, as for the server's machine, or more.
     pub fn of_addresses(self) -> Self {
         Self {
             remote: self.remote.max(Self::default().local),
