@@ -225,14 +225,24 @@ impl CallLimits {
         self.lists.take(key).await
     }
 
-    /// Admits an answer that is ready, to a request that is no call, as soon as the caller has read enough
-    /// others; `None` if that takes too long.
+    /// Admits an answer that is ready, to a request that is no call, as soon as the caller may make
+    /// another call and has read enough others; `None` if that takes too long.
     pub async fn admit_answer(&self, key: Key) -> Option<Admitted> {
-        self.calls.charge(key, 1);
-        let kept = match self.answers.try_take(key) {
-            Some(kept) => kept,
+        let wait = self.calls.wait(key);
+        let at_once = wait.is_zero().then(|| self.answers.try_take(key)).flatten();
+        let kept = match at_once {
+            Some(kept) => {
+                self.calls.charge(key, 1);
+                kept
+            }
             None => {
                 let _waiting = self.place_to_wait(key)?;
+                if wait > MAX_WAIT {
+                    self.delay_refusal().await;
+                    return None;
+                }
+                self.calls.charge(key, 1);
+                tokio::time::sleep(wait).await;
                 within(self.answers.take(key)).await?
             }
         };
@@ -331,6 +341,8 @@ impl CallLimits {
 
 #[cfg(test)]
 mod tests {
+    use futures::FutureExt as _;
+
     use super::*;
 
     fn key(last: u8) -> Key {
@@ -361,6 +373,22 @@ mod tests {
         assert_eq!(refused.reason, "TOO_MANY_CALLS");
         assert!(refused.retry_after.as_secs() > 90);
         assert!(limits.admit(key(1), true, 1).await.is_err());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_flood_of_requests_that_are_no_calls_locks_nobody_out() {
+        let limits = limits();
+        let mut answered = 0;
+        for _ in 0..2 * CALLS_AT_ONCE {
+            let admitted = limits.admit_answer(key(1)).now_or_never();
+            answered += u64::from(admitted.flatten().is_some());
+        }
+        assert_eq!(answered, CALLS_AT_ONCE + 1);
+        let wait = limits.wait(key(1));
+        assert!(wait <= MAX_WAIT + Duration::from_millis(1), "{wait:?}");
+        assert!(limits.admit_answer(key(2)).now_or_never().is_some());
+        tokio::time::sleep(Duration::from_millis(1)).await;
+        limits.admit(key(1), false, 1).await.expect("after a while");
     }
 
     #[tokio::test(start_paused = true)]
