@@ -78,6 +78,9 @@ pub struct Call {
     pub sends_many: bool,
     /// Whether its service limits the rate of what its client sends.
     pub has_own_rate: bool,
+    /// Whether each message of its client counts as a call, and its answers as those of calls: they
+    /// are larger, and nothing else limits their number.
+    pub charges_each: bool,
     /// What each of its messages may be.
     pub message: MessageLimits,
     /// Calls that it counts as for its caller. Decoding a large message counts besides.
@@ -148,6 +151,14 @@ impl Call {
         }
     }
 
+    /// Each message of its client counts as a call.
+    const fn charging_each(self) -> Self {
+        Self {
+            charges_each: true,
+            ..self
+        }
+    }
+
     const fn takes(self, bytes: usize, elements: usize, memory: usize) -> Self {
         Self {
             message: MessageLimits {
@@ -178,6 +189,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         forwarded: false,
         sends_many: false,
         has_own_rate: false,
+        charges_each: false,
         message: MessageLimits::USUAL,
         charge: 1,
     }
@@ -501,7 +513,8 @@ pub const CALLS: &[Call] = &[
         Anyone,
         Unlimited,
     )
-    .sending(),
+    .sending()
+    .charging_each(),
 ];
 
 /// The calls that only nodes make of each other, on a listener of their own. The rest of the server

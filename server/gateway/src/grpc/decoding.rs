@@ -289,7 +289,7 @@ impl Messages {
                     }
                     let cost = || self.cost(&message[PREFIX..]);
                     let memory = beside_tasks(message.len(), cost)?;
-                    if memory <= SMALL_DECODED {
+                    if memory <= SMALL_DECODED && !self.call.charges_each {
                         self.limits.charge(self.key, self.charge(memory));
                         return Poll::Ready(Ok(Step::Pass(message)));
                     }
@@ -380,12 +380,12 @@ impl Messages {
         }
     }
 
-    /// A permit to decode a message into this many bytes. Its caller is charged; a large message of a
-    /// stream waits first until the caller may make another call.
+    /// A permit to decode a message into this many bytes. Its caller is charged; a message of a stream
+    /// that is large or counts as a call waits first until the caller may make another call.
     fn decode(&self, memory: usize) -> BoxFuture<'static, Result<Permit, Refused>> {
         let (limits, key) = (Arc::clone(&self.limits), self.key);
         let (calls, plays) = (self.charge(memory), self.call.plays());
-        let waits = self.call.sends_many && self.is_large(memory);
+        let waits = self.call.charges_each || self.call.sends_many && self.is_large(memory);
         Box::pin(async move {
             if waits {
                 limits.may_call(key).await;
@@ -398,10 +398,11 @@ impl Messages {
 
     /// How many calls a message counts as that is decoded into this many bytes.
     fn charge(&self, memory: usize) -> u64 {
-        match self.begun == 1 || self.is_large(memory) {
+        let decoding = match self.begun == 1 || self.is_large(memory) {
             true => memory as u64 / DECODED_BYTES_PER_CALL,
             false => 0,
-        }
+        };
+        decoding + u64::from(self.call.charges_each)
     }
 
     /// Whether a message that is decoded into this many bytes counts wherever in a stream it is.
@@ -949,6 +950,16 @@ mod tests {
         let expected = time(most.expect("legal").memory as u64 / DECODED_BYTES_PER_CALL);
         let wait = limits.wait(key).as_secs_f64();
         assert!((wait - expected).abs() < 0.01, "{wait} {expected}");
+
+        // Each question about the protocol counts as a call, because its answer is larger.
+        tokio::time::sleep(limits.wait(key)).await;
+        let path = "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
+        let body = http_body_util::Full::new(Bytes::from(framed(&[]).repeat(1_000)));
+        let begun = Instant::now();
+        let answer = services.call(request(path, Body::new(body))).await;
+        assert_eq!(reason_of(&answer.expect("infallible")), None);
+        let waited = begun.elapsed().as_secs_f64();
+        assert!((waited - time(1_000)).abs() < 0.1, "{waited}");
     }
 
     #[tokio::test]

@@ -155,6 +155,7 @@ where
         let client = own_client(request.extensions()).cloned();
         let caller: Option<&Caller> = request.extensions().get();
         let token = caller.and_then(|caller| caller.token);
+        let charges_bytes = call.is_none_or(|call| !call.streams || call.charges_each);
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
         let call = Call::find(request.uri().path());
         let (is_stream, cost) = call.map_or((false, 1), |call| (call.streams, call.charge));
@@ -164,7 +165,7 @@ where
             client,
             number,
             is_stream,
-            charges_bytes: !is_stream,
+            charges_bytes,
             unread: None,
             admitted: None,
         };
