@@ -329,6 +329,11 @@ impl Client {
         extensions.get()
     }
 
+    /// Whether it is a trusted proxy, whose connection carries many callers.
+    pub fn is_proxy(&self) -> bool {
+        self.key == Key::Proxies
+    }
+
     /// Number of its calls so far, including streams.
     pub fn calls(&self) -> u64 {
         self.calls.load(Relaxed)
@@ -699,6 +704,21 @@ mod tests {
         assert!(closed(&clients).is_empty());
         clients[0].stream_gone(1);
         assert_eq!(clients[0].streams(), 0);
+    }
+
+    #[test]
+    fn the_connection_of_a_trusted_proxy_is_nobodys_own() {
+        let proxy = "10.0.0.0/8".parse().expect("a network");
+        let connections = Connections::new(
+            Limits {
+                trusted_proxies: TrustedProxies::new([proxy]),
+                ..limits(8)
+            },
+            Arc::default(),
+        );
+        let admit = |address: [u8; 4]| connections.admit(Some((address, 1).into()));
+        assert!(admit([10, 1, 2, 3]).is_some_and(|it| it.is_proxy()));
+        assert!(admit([192, 0, 2, 7]).is_some_and(|it| !it.is_proxy()));
     }
 
     #[tokio::test]

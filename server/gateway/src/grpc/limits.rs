@@ -54,13 +54,10 @@ impl Arrived {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Charged(pub(super) Key);
 
-/// The client that sent a request, unless a proxy did: its connection belongs to many callers.
+/// The client that sent a request, unless a proxy did: its connection belongs to many callers, also
+/// if the proxy names none of them.
 fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
-    let address = peer_address(extensions);
-    let is_own = |client: &&Arc<Client>| {
-        client.address.map(|address| address.ip().to_canonical()) == address
-    };
-    Client::of(extensions).filter(is_own)
+    Client::of(extensions).filter(|client| !client.is_proxy())
 }
 
 /// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
@@ -155,10 +152,10 @@ where
         let client = own_client(request.extensions()).cloned();
         let caller: Option<&Caller> = request.extensions().get();
         let token = caller.and_then(|caller| caller.token);
-        let charges_bytes = call.is_none_or(|call| !call.streams || call.charges_each);
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
         let call = Call::find(request.uri().path());
         let (is_stream, cost) = call.map_or((false, 1), |call| (call.streams, call.charge));
+        let charges_bytes = call.is_none_or(|call| !call.streams || call.charges_each);
         let mut place = Place {
             limits: Arc::clone(&self.limits),
             key,
