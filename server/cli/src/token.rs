@@ -160,7 +160,12 @@ impl List {
             )
             .into());
         }
-        let tokens = TokenFile::of(&data_dir).read()?.unwrap_or_default();
+        let entries = TokenFile::of(&data_dir).entries()?.unwrap_or_default();
+        let (tokens, unreadable): (Vec<_>, Vec<_>) = entries.into_iter().partition(Result::is_ok);
+        let tokens: Vec<_> = tokens.into_iter().flatten().collect();
+        for unreadable in unreadable.into_iter().filter_map(Result::err) {
+            eprintln!("an entry grants nothing: {}", unreadable.problem);
+        }
         let now_ms = since_epoch_ms();
         if self.place.json {
             let lines = tokens.iter().map(|token| line_of(token, now_ms));
@@ -192,11 +197,13 @@ impl Revoke {
         let file = TokenFile::of(&data_dir::name(self.place.data_dir)?);
         // Before it is locked: locking creates a file.
         let unknown = || format!("unknown token {}; see `chefshat token list`", self.id);
-        file.read()?.ok_or_else(unknown)?;
+        file.entries()?.ok_or_else(unknown)?;
         let revoked = file.revoke(self.id)?.ok_or_else(unknown)?;
-        match self.place.json {
-            true => say(line_of(&revoked, since_epoch_ms()))?,
-            false => say(format!("revoked {} ({})", revoked.id, revoked.role))?,
+        match (self.place.json, revoked) {
+            (true, Ok(revoked)) => say(line_of(&revoked, since_epoch_ms()))?,
+            (true, Err(_)) => say(json!({ "id": self.id.to_string() }))?,
+            (false, Ok(revoked)) => say(format!("revoked {} ({})", revoked.id, revoked.role))?,
+            (false, Err(_)) => say(format!("revoked {}", self.id))?,
         }
         Ok(())
     }

@@ -431,7 +431,8 @@ async fn a_stream_ends_with_its_token_and_no_other_does() {
         .tokens
         .revoke(revoked)
         .expect("written")
-        .expect("a token");
+        .expect("a token")
+        .expect("readable");
     let ended = async {
         loop {
             match streams[0].message().await {

@@ -11,6 +11,8 @@ use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use chefshat_record::private;
 use chefshat_room::ids::{Id, SecretHash, random_bytes};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tracing::warn;
 
 use super::caller::{Role, Scope};
 use super::token::{AccessToken, TokenId};
@@ -56,6 +58,11 @@ pub enum TokenFileError {
         /// What is wrong.
         problem: String,
     },
+    /// It no longer exists, although it had tokens.
+    #[error(
+        "{0} is gone; restore it, or revoke its tokens one by one with `chefshat token revoke`"
+    )]
+    Gone(PathBuf),
     /// A later version of the program wrote it.
     #[error("{path} was written by a newer version of chefshat (form {version}); use that version")]
     TooNew {
@@ -100,6 +107,33 @@ impl StoredToken {
     }
 }
 
+/// An entry of the file that is not that of a token. It grants nothing, and stays in the file until
+/// it is revoked.
+#[derive(Debug, Clone)]
+pub struct Unreadable {
+    /// The entry.
+    entry: Value,
+    /// What is wrong.
+    pub problem: String,
+}
+
+impl Unreadable {
+    /// The public part of the token, if it has one.
+    pub fn id(&self) -> Option<TokenId> {
+        self.entry.get("id")?.as_str()?.parse().ok()
+    }
+}
+
+/// A token of the file, or an entry that is not that of one.
+pub type Entry = Result<StoredToken, Unreadable>;
+
+fn id_of(entry: &Entry) -> Option<TokenId> {
+    match entry {
+        Ok(token) => Some(token.id),
+        Err(unreadable) => unreadable.id(),
+    }
+}
+
 /// The settings of a new token.
 #[derive(Debug, Clone)]
 pub struct NewToken {
@@ -131,11 +165,31 @@ impl TokenFile {
         &self.path
     }
 
-    /// The tokens, in the order of creation; `None` if there is no file.
+    /// The tokens, in the order of creation; `None` if there is no file. Logs entries that are not
+    /// those of tokens.
     ///
     /// # Errors
     /// The file is unreadable.
     pub fn read(&self) -> Result<Option<Vec<StoredToken>>, TokenFileError> {
+        let Some(entries) = self.entries()? else {
+            return Ok(None);
+        };
+        let readable = |entry: Entry| match entry {
+            Ok(token) => Some(token),
+            Err(Unreadable { problem, .. }) => {
+                warn!(problem, "an entry of the tokens file grants nothing");
+                None
+            }
+        };
+        Ok(Some(entries.into_iter().filter_map(readable).collect()))
+    }
+
+    /// All entries, in the order of creation, without copies of the same token; `None` if there is no
+    /// file.
+    ///
+    /// # Errors
+    /// The file is unreadable.
+    pub fn entries(&self) -> Result<Option<Vec<Entry>>, TokenFileError> {
         let path = || self.path.clone();
         let text = match std::fs::read(&self.path) {
             Ok(text) => text,
@@ -158,13 +212,26 @@ impl TokenFile {
                 version: form.version,
             });
         }
-        let tokens: Tokens =
+        let read: Tokens<Value> =
             serde_json::from_slice(&text).map_err(|it| malformed(it.to_string()))?;
-        let tokens = tokens.tokens.into_iter().map(Line::read);
-        tokens
-            .collect::<Result<_, _>>()
-            .map(Some)
-            .map_err(malformed)
+        let mut entries: Vec<Entry> = Vec::new();
+        for entry in read.tokens {
+            let line = Line::deserialize(&entry).map_err(|it| it.to_string());
+            let read = line.and_then(Line::read).and_then(|token| {
+                match entries.iter().flatten().find(|other| other.id == token.id) {
+                    None => Ok(Some(token)),
+                    Some(other) if other.grants_the_same_as(&token) => Ok(None),
+                    Some(_) => Err("another token has the same id".to_owned()),
+                }
+            });
+            let read = read.map_err(|problem| {
+                let id = entry.get("id").unwrap_or(&Value::Null);
+                let problem = format!("token {id}: {problem}");
+                Unreadable { entry, problem }
+            });
+            entries.extend(read.transpose());
+        }
+        Ok(Some(entries))
     }
 
     /// Adds a token and returns it with its secret, which is stored nowhere.
@@ -173,17 +240,17 @@ impl TokenFile {
     /// The file cannot be read or written.
     pub fn create(&self, new: NewToken) -> Result<AccessToken, TokenFileError> {
         let _lock = self.lock()?;
-        let mut tokens = self.read()?.unwrap_or_default();
+        let mut entries = self.entries()?.unwrap_or_default();
         let id = loop {
             let id = TokenId(random_bytes());
-            if tokens.iter().all(|token| token.id != id) {
+            if entries.iter().all(|entry| id_of(entry) != Some(id)) {
                 break id;
             }
         };
         let token = AccessToken::random(id);
         let now = since_epoch_ms();
         let lifetime_ms = |it: Duration| u64::try_from(it.as_millis()).unwrap_or(u64::MAX);
-        tokens.push(StoredToken {
+        entries.push(Ok(StoredToken {
             id,
             hash: token.hash(),
             role: new.role,
@@ -191,24 +258,25 @@ impl TokenFile {
             created_at_ms: now,
             expires_at_ms: new.lifetime.map(|it| now.saturating_add(lifetime_ms(it))),
             scope: new.scope,
-        });
-        self.write(&tokens)?;
+        }));
+        self.write(&entries)?;
         Ok(token)
     }
 
-    /// Removes a token and returns it; `None` if there is no such token.
+    /// Removes the entries with this id and returns the first; `None` if there is none.
     ///
     /// # Errors
     /// The file cannot be read or written.
-    pub fn revoke(&self, id: TokenId) -> Result<Option<StoredToken>, TokenFileError> {
+    pub fn revoke(&self, id: TokenId) -> Result<Option<Entry>, TokenFileError> {
         let _lock = self.lock()?;
-        let mut tokens = self.read()?.unwrap_or_default();
-        let Some(index) = tokens.iter().position(|token| token.id == id) else {
-            return Ok(None);
-        };
-        let revoked = tokens.remove(index);
-        self.write(&tokens)?;
-        Ok(Some(revoked))
+        let entries = self.entries()?.unwrap_or_default();
+        let is_revoked = |entry: &Entry| id_of(entry) == Some(id);
+        let (revoked, kept): (Vec<_>, Vec<_>) = entries.into_iter().partition(is_revoked);
+        let revoked = revoked.into_iter().next();
+        if revoked.is_some() {
+            self.write(&kept)?;
+        }
+        Ok(revoked)
     }
 
     /// Locks the file against other editors, until the lock is dropped.
@@ -227,10 +295,14 @@ impl TokenFile {
         })
     }
 
-    fn write(&self, tokens: &[StoredToken]) -> Result<(), TokenFileError> {
+    fn write(&self, entries: &[Entry]) -> Result<(), TokenFileError> {
+        let written = |entry: &Entry| match entry {
+            Ok(token) => Written::Line(Line::of(token)),
+            Err(unreadable) => Written::Unreadable(unreadable.entry.clone()),
+        };
         let tokens = Tokens {
             version: VERSION,
-            tokens: tokens.iter().map(Line::of).collect(),
+            tokens: entries.iter().map(written).collect(),
         };
         let text = serde_json::to_vec_pretty(&tokens).expect("the form has only texts and numbers");
         let mut file = AtomicFile::create_private(&self.path)?;
@@ -248,9 +320,16 @@ struct Form {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Tokens {
+struct Tokens<T> {
     version: u32,
-    tokens: Vec<Line>,
+    tokens: Vec<T>,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Written {
+    Line(Line),
+    Unreadable(Value),
 }
 
 /// A token in the file.
@@ -292,7 +371,7 @@ impl Line {
 
     fn read(self) -> Result<StoredToken, String> {
         let id: TokenId = self.id.parse()?;
-        let wrong = |field: &str| format!("token {id}: `{field}` is not valid");
+        let wrong = |field: &str| format!("`{field}` is not valid");
         let scope = match (&self.room, &self.tournament) {
             (None, None) => None,
             (Some(room), None) => Some(Scope::Room(Id::parse(room).ok_or_else(|| wrong("room"))?)),
@@ -383,28 +462,12 @@ mod tests {
     fn a_damaged_file_is_refused_and_left_as_it_is() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = TokenFile::of(folder.path());
-        let line = r#"{"id":"00000000","role":"ROLE","created_at_ms":0,"sha256":"HASH"}"#;
-        let hash = "0".repeat(64);
         for (text, problem) in [
             ("", "is not a file of tokens"),
             (r#"{"version":2,"tokens":[],"more":1}"#, "newer version"),
             (
                 r#"{"version":1,"tokens":[],"more":1}"#,
                 "unknown field `more`",
-            ),
-            (
-                &format!(
-                    r#"{{"version":1,"tokens":[{}]}}"#,
-                    line.replace("HASH", &hash)
-                ),
-                "unknown variant `ROLE`",
-            ),
-            (
-                &format!(
-                    r#"{{"version":1,"tokens":[{}]}}"#,
-                    line.replace("ROLE", "host")
-                ),
-                "`sha256` is not valid",
             ),
         ] {
             std::fs::write(file.path(), text).expect("written");
@@ -413,5 +476,58 @@ mod tests {
             assert!(file.create(player("")).is_err());
             assert_eq!(std::fs::read_to_string(file.path()).expect("a file"), text);
         }
+    }
+
+    #[test]
+    fn an_entry_that_is_not_a_token_grants_nothing_and_stays_until_it_is_revoked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = TokenFile::of(folder.path());
+        let line = r#"{"id":"0000000N","role":"ROLE","created_at_ms":0,"sha256":"HASH"}"#;
+        let line = |number: &str, role: &str, hash: &str| {
+            let line = line.replace("0000000N", &format!("0000000{number}"));
+            line.replace("ROLE", role).replace("HASH", hash)
+        };
+        let (hash, other) = ("0".repeat(64), "1".repeat(64));
+        let lines = [
+            line("1", "operator", &hash),
+            line("2", "host", "short"),
+            line("3", "host", &hash),
+            // A copy, and a different token with its id.
+            line("3", "host", &hash),
+            line("3", "host", &other),
+            "7".to_owned(),
+        ];
+        let text = format!(r#"{{"version":1,"tokens":[{}]}}"#, lines.join(","));
+        std::fs::write(file.path(), text).expect("written");
+        let problems = || {
+            let entries = file.entries().expect("readable").expect("a file");
+            let problems = entries.into_iter().filter_map(Result::err);
+            problems.map(|it| it.problem).collect::<Vec<_>>()
+        };
+        let found = problems();
+        for (problem, said) in found.iter().zip([
+            "token \"00000001\": unknown variant `operator`",
+            "token \"00000002\": `sha256` is not valid",
+            "token \"00000003\": another token has the same id",
+            "token null: invalid type",
+        ]) {
+            assert!(problem.starts_with(said), "{problem}");
+        }
+        assert_eq!(found.len(), 4);
+        let ids = || {
+            let tokens = file.read().expect("readable").expect("a file");
+            tokens
+                .iter()
+                .map(|it| it.id.to_string())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(ids(), ["00000003"]);
+        let revoke = |id: &str| file.revoke(id.parse().expect("an id")).expect("written");
+        assert!(revoke("00000003").is_some_and(|entry| entry.is_ok()));
+        assert_eq!(ids(), [""; 0], "all copies are gone");
+        assert_eq!(problems().len(), 3);
+        assert!(revoke("00000001").is_some_and(|entry| entry.is_err()));
+        file.create(player("Ana")).expect("written");
+        assert_eq!((ids().len(), problems().len()), (1, 2));
     }
 }

@@ -386,7 +386,10 @@ impl Access {
         self.looks.fetch_add(1, Ordering::Relaxed);
         let mut watch = (watch.lock()).expect("no code that holds this lock can panic");
         let read = watch.read_changed(|| {
-            let tokens = file.read()?.unwrap_or_default();
+            // An editor may have removed it before it writes a new one, and a server may not forget
+            // its tokens because a disk is not mounted.
+            let gone = || TokenFileError::Gone(file.path().to_path_buf());
+            let tokens = file.read()?.ok_or_else(gone)?;
             debug!(tokens = tokens.len(), "tokens read again");
             self.replace(tokens);
             Ok::<_, TokenFileError>(())
@@ -661,6 +664,41 @@ mod tests {
         assert!(!third.signal().is_cancelled());
         let refused = setup.check("PlayService/Play", Some(&revoked)).map(|_| ());
         assert_eq!(refused, Err(Refusal::TokenUnknown));
+    }
+
+    #[test]
+    fn tokens_stay_while_their_file_is_gone() {
+        let setup = Setup::new(&required());
+        let token = setup.add(Role::Player, None, None);
+        let granted = setup.check("PlayService/Play", Some(&token));
+        let ended = granted.expect("valid").ended.expect("with a token");
+        std::fs::remove_file(setup.file.path()).expect("a file");
+        setup.access.read_if_changed();
+        setup
+            .check("PlayService/Play", Some(&token))
+            .expect("valid");
+        let other = setup.add(Role::Player, None, None);
+        assert!(ended.signal().is_cancelled(), "a new file without it");
+        setup
+            .check("PlayService/Play", Some(&other))
+            .expect("valid");
+    }
+
+    #[test]
+    fn a_token_that_the_file_has_twice_can_be_revoked() {
+        let setup = Setup::new(&required());
+        let token = setup.add(Role::Player, None, None);
+        let text = std::fs::read_to_string(setup.file.path()).expect("a file");
+        let (before, line) = text.split_once('[').expect("a list");
+        let (line, after) = line.rsplit_once(']').expect("a list");
+        let text = format!("{before}[{line},{line}]{after}");
+        std::fs::write(setup.file.path(), text).expect("written");
+        setup.access.read_if_changed();
+        let granted = setup.check("PlayService/Play", Some(&token));
+        let ended = granted.expect("valid").ended.expect("with a token");
+        assert!(setup.file.revoke(token.id).expect("written").is_some());
+        setup.access.read_if_changed();
+        assert!(ended.signal().is_cancelled());
     }
 
     #[test]

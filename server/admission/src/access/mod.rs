@@ -17,7 +17,7 @@ pub use calls::{
     CALLS, COST_OF_STREAM, Call, MAX_INPUTS_PER_MESSAGE, MAX_MESSAGE_BYTES,
     MAX_STUDY_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES, MessageLimits, Scoped,
 };
-pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
+pub use file::{Entry, NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError, Unreadable};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};
 pub use secrets::{MAX_SECRETS, Relation, SECRET_HEADER, Secrets, SecretsRefused};
 pub use token::{AccessToken, TokenId};
