@@ -24,11 +24,11 @@ use tokio::time::{Instant, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tonic::body::Body;
-use tonic::service::Routes;
+use tonic::service::{LayerExt as _, Routes};
 use tonic::transport;
 use tonic::transport::server::Connected;
 use tonic_health::ServingStatus;
-use tower::util::{MapRequestLayer, option_layer};
+use tower::util::{MapRequestLayer, MapResponseLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
@@ -363,12 +363,14 @@ impl Server {
             (&tournaments, &studies),
             &calls,
             &connections,
+        let closed = closing.clone();
+        let ending = MapResponseLayer::new(move |it| grpc::until_closing(it, &closed));
             &config,
             &closing,
             retention,
         )?
-        .add_service(health_service)
-        .add_service(reflection());
+        .add_service(ending.named_layer(health_service))
+        .add_service(ending.named_layer(reflection()));
         let following = health::report(
             health.clone(),
             node.as_ref().map(ClusterNode::serves),

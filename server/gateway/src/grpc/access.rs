@@ -11,14 +11,14 @@ use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
 use http::{HeaderMap, Request, Response, header};
 use http_body::Frame;
-use tokio_util::sync::WaitForCancellationFutureOwned;
+use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::body::Body;
 use tonic::{Code, Status};
 use tower::{Layer, Service};
 use tracing::info;
 
 use super::limits::refuse;
-use super::status::status;
+use super::status::{shutting_down, status};
 use crate::connections::peer_address;
 use chefshat_admission::access::{
     Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
@@ -196,13 +196,20 @@ async fn until_ended<E>(
     }
 }
 
-/// A body that ends once its token does.
-struct EndingBody {
+/// An answer of a service that does not know when the server shuts down, ended then.
+pub fn until_closing(answer: Response<Body>, closing: &CancellationToken) -> Response<Body> {
+    answer.map(|body| EndingBody::with(body, closing, Side::Response, shutting_down))
+}
+
+/// A body that ends with a signal: that of its token, or that the server shuts down.
+struct EndingBody<F> {
     /// `None` after the end.
     body: Option<Body>,
     side: Side,
+    signal: CancellationToken,
     signalled: Pin<Box<WaitForCancellationFutureOwned>>,
-    ended: Ended,
+    /// Why it has ended.
+    why: F,
 }
 
 /// Which body of a call.
@@ -214,22 +221,30 @@ enum Side {
     Response,
 }
 
-impl EndingBody {
+impl EndingBody<fn() -> Status> {
     fn of(body: Body, ended: &Ended, side: Side) -> Body {
+        let token = ended.clone();
+        EndingBody::with(body, ended.signal(), side, move || refused(token.refusal()))
+    }
+}
+
+impl<F: Fn() -> Status + Unpin + Send + 'static> EndingBody<F> {
+    fn with(body: Body, signal: &CancellationToken, side: Side, why: F) -> Body {
         // The body of a finished call has nothing left to end.
         match body.is_end_stream() {
             true => body,
             false => Body::new(Self {
                 body: Some(body),
                 side,
-                signalled: Box::pin(ended.signal().clone().cancelled_owned()),
-                ended: ended.clone(),
+                signal: signal.clone(),
+                signalled: Box::pin(signal.clone().cancelled_owned()),
+                why,
             }),
         }
     }
 }
 
-impl HttpBody for EndingBody {
+impl<F: Fn() -> Status + Unpin> HttpBody for EndingBody<F> {
     type Data = Bytes;
     type Error = Status;
 
@@ -242,7 +257,7 @@ impl HttpBody for EndingBody {
             return Poll::Ready(None);
         };
         // Checked first: a body that always has something to send ends as well.
-        if !this.ended.signal().is_cancelled() {
+        if !this.signal.is_cancelled() {
             let frame = Pin::new(body).poll_frame(context);
             if frame.is_ready() {
                 return frame;
@@ -252,7 +267,7 @@ impl HttpBody for EndingBody {
             Poll::Pending => Poll::Pending,
             Poll::Ready(()) => {
                 this.body = None;
-                let status = refused(this.ended.refusal());
+                let status = (this.why)();
                 Poll::Ready(Some(match this.side {
                     Side::Request => Err(status),
                     Side::Response => {
@@ -336,6 +351,21 @@ mod tests {
     use super::*;
     use chefshat_admission::access::{AccessSettings, NewToken, Role, TokenFile};
     use chefshat_admission::limits::Shares;
+
+    #[tokio::test]
+    async fn a_stream_of_a_service_of_the_transport_ends_when_the_server_shuts_down() {
+        let silent = stream::pending::<Result<Frame<Bytes>, Status>>();
+        let closing = CancellationToken::new();
+        let answer = Response::new(Body::new(StreamBody::new(silent)));
+        let mut body = until_closing(answer, &closing).into_body();
+        assert!(body.frame().now_or_never().is_none());
+        closing.cancel();
+        let end = body.frame().now_or_never().flatten().expect("a frame");
+        let trailers = end.expect("no error").into_trailers().expect("trailers");
+        let status = Status::from_header_map(&trailers).expect("a status");
+        assert_eq!(status.code(), shutting_down().code());
+        assert!(body.frame().await.is_none());
+    }
 
     /// A stream of a client that sends nothing and reads nothing.
     #[tokio::test(start_paused = true)]

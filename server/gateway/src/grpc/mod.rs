@@ -34,7 +34,7 @@ mod takeover;
 mod tournaments;
 mod vector;
 
-pub use access::AccessLayer;
+pub use access::{AccessLayer, until_closing};
 pub use admin::AdminCalls;
 pub use analysis::Analyses;
 pub use decoding::DecodingLayer;
