@@ -14,6 +14,7 @@ mod probing;
 use std::future::Future;
 use std::io;
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use chefshat_proto::v1;
 use futures::future::{BoxFuture, Either, try_join};
@@ -42,8 +43,8 @@ use crate::connections::{self, Client, Connection, Connections, Limits, Listener
 use crate::forwarded::ForwardedLayer;
 use crate::grpc;
 use crate::handshakes::Handshakes;
-use crate::limits::{CallLimits, Metered};
 use crate::limits::frames::MAX_HEADER_BYTES;
+use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
 use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
@@ -68,6 +69,10 @@ const CLIENT_STREAM_WINDOW: u32 = 256 * 1024;
 /// Most bytes that wait on all streams of a connection: one that is not read leaves most of them to
 /// others.
 const CLIENT_CONNECTION_WINDOW: u32 = 1024 * 1024;
+
+/// How long a browser need not ask again whether a page of another origin may call: the longest that
+/// one remembers.
+const PREFLIGHT_AGE: Duration = Duration::from_secs(2 * 3_600);
 
 /// Why serving failed.
 #[derive(Debug, thiserror::Error)]
@@ -358,13 +363,13 @@ impl Server {
         let first_bytes = config.first_bytes_timeout;
         let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));
         let (health, health_service) = tonic_health::server::health_reporter();
+        let closed = closing.clone();
+        let ending = MapResponseLayer::new(move |it| grpc::until_closing(it, &closed));
         let routes = routes(
             &rooms,
             (&tournaments, &studies),
             &calls,
             &connections,
-        let closed = closing.clone();
-        let ending = MapResponseLayer::new(move |it| grpc::until_closing(it, &closed));
             &config,
             &closing,
             retention,
@@ -454,7 +459,8 @@ impl Server {
             }
         };
         let closed = closing.clone();
-        let origins = Origins::new(config.allowed_origins.clone(), config.allowed_hosts.clone());
+        let origins = Origins::new(&config.allowed_origins, config.allowed_hosts.clone());
+        let cors = cors(origins.listed())?;
         let mut builder = transport::Server::builder();
         if let Some(age) = config.max_connection_age {
             builder = builder.max_connection_age(age);
@@ -468,7 +474,7 @@ impl Server {
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins, Arc::clone(&calls)))
-            .layer(cors(&config.allowed_origins)?)
+            .layer(cors)
             .layer(PageLayer::new(
                 encrypted,
                 Arc::clone(&calls),
@@ -708,6 +714,7 @@ fn cors(origins: &[String]) -> Result<CorsLayer, ServeError> {
     let layer = CorsLayer::new()
         .allow_methods([http::Method::POST])
         .allow_headers(AllowHeaders::mirror_request())
+        .max_age(PREFLIGHT_AGE)
         .expose_headers(
             ["grpc-status", "grpc-message", "grpc-status-details-bin"].map(HeaderName::from_static),
         );

@@ -331,7 +331,7 @@ impl Serve {
         let has_local_metrics = metrics_address.is_some_and(|address| address.ip().is_loopback());
         let metrics_hosts = has_local_metrics || !allowed_hosts.is_empty();
         let metrics_hosts = metrics_hosts.then(|| allowed_hosts.clone());
-        let metrics_names = Origins::new(Vec::new(), metrics_hosts);
+        let metrics_names = Origins::new(&[], metrics_hosts);
         let signing_key = data_dir.as_deref().map(key_or_new).transpose()?;
         let config = ServerConfig {
             data_dir,

@@ -352,7 +352,7 @@ mod tests {
         ] {
             let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
             let address = listener.local_addr().expect("bound");
-            let origins = Origins::new(Vec::new(), hosts);
+            let origins = Origins::new(&[], hosts);
             tokio::spawn(serve(listener, Arc::default(), origins));
             let mut client = TcpStream::connect(address).await.expect("it listens");
             let request = format!("GET /metrics HTTP/1.1\r\nHost: {name}\r\n\r\n");

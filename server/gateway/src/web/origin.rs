@@ -11,11 +11,13 @@ use std::task::{Context, Poll};
 use axum::body::Body as Text;
 use futures::future::{BoxFuture, Either};
 use http::uri::Authority;
-use http::{HeaderName, HeaderValue, Request, Response, StatusCode, header};
+use http::{HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
 use tonic::body::Body;
 use tower::{Layer, Service};
 use tracing::info;
 
+use super::answer::busy;
+use super::with_body;
 use crate::connections::peer_address;
 use crate::grpc::within_share;
 use chefshat_admission::limits::{CallLimits, LogPace};
@@ -23,7 +25,7 @@ use chefshat_admission::limits::{CallLimits, LogPace};
 /// Whose pages and under which names the server may be reached.
 #[derive(Debug)]
 pub struct Origins {
-    /// Web origins besides the server's own; `*` allows all.
+    /// Web origins besides the server's own, as browsers send them; `*` allows all.
     origins: Vec<String>,
     /// Names of hosts besides those of this machine; `None`: all.
     hosts: Option<Vec<String>>,
@@ -43,12 +45,17 @@ enum Foreign {
 impl Origins {
     /// Allows the server's own page, these origins and, if given, only these hosts besides the
     /// names of this machine.
-    pub fn new(origins: Vec<String>, hosts: Option<Vec<String>>) -> Self {
+    pub fn new(origins: &[String], hosts: Option<Vec<String>>) -> Self {
         Self {
-            origins,
+            origins: origins.iter().map(|origin| as_sent(origin)).collect(),
             hosts,
             logged: LogPace::new(LOGGED),
         }
+    }
+
+    /// The allowed origins besides the server's own, as browsers send them; `*` allows all.
+    pub fn listed(&self) -> &[String] {
+        &self.origins
     }
 
     /// Checks the origin and host of a request.
@@ -70,7 +77,7 @@ impl Origins {
         let Ok(origin) = origin.to_str() else {
             return false;
         };
-        let listed = |allowed: &String| allowed == "*" || allowed.eq_ignore_ascii_case(origin);
+        let listed = |allowed: &String| allowed == "*" || allowed == origin;
         if self.origins.iter().any(listed) {
             return true;
         }
@@ -88,6 +95,16 @@ impl Origins {
         let host = host.strip_suffix(port).unwrap_or(host);
         !own.is_empty() && own.eq_ignore_ascii_case(host)
     }
+}
+
+/// An origin as browsers send it: in small letters, without the default port of its scheme.
+fn as_sent(origin: &str) -> String {
+    let origin = origin.to_ascii_lowercase();
+    let port = match origin.starts_with("https:") {
+        true => ":443",
+        false => ":80",
+    };
+    origin.strip_suffix(port).unwrap_or(&origin).to_owned()
 }
 
 /// The host and port that a request names: of its URI in HTTP/2, else of its header.
@@ -147,6 +164,8 @@ pub struct WithOrigin<S> {
 impl<S, B> Service<Request<B>> for WithOrigin<S>
 where
     S: Service<Request<B>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send,
 {
     type Response = Response<Body>;
     type Error = S::Error;
@@ -159,6 +178,15 @@ where
     fn call(&mut self, request: Request<B>) -> Self::Future {
         let OriginLayer { origins, limits } = &self.layer;
         match origins.check(&request) {
+            // Answered before the limits of calls: it counts here.
+            Ok(()) if request.method() == Method::OPTIONS => {
+                let (limits, extensions) = (Arc::clone(limits), request.extensions().clone());
+                let answering = self.services.call(request);
+                Either::Left(Box::pin(async move {
+                    let kept = within_share(&limits, &extensions, answering.await?).await;
+                    Ok(kept.unwrap_or_else(|| with_body(busy(&Method::OPTIONS))))
+                }))
+            }
             Ok(()) => Either::Right(self.services.call(request)),
             Err(foreign) => {
                 if origins.logged.admits() {
@@ -207,7 +235,14 @@ fn refused(foreign: Foreign) -> Response<Body> {
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
+    use futures::FutureExt as _;
+    use tower::service_fn;
+
     use super::*;
+    use chefshat_admission::limits::calls::CALLS_AT_ONCE;
+    use chefshat_admission::limits::{Key, Shares};
 
     fn request(host: &str, origin: Option<&str>) -> Request<()> {
         let mut request = Request::post("/chefshat.v1.RoomService/CreateRoom").header("host", host);
@@ -219,16 +254,18 @@ mod tests {
 
     #[test]
     fn only_the_own_page_and_allowed_origins_call() {
-        let listed = vec!["https://example.org".to_owned()];
-        let some = Origins::new(listed, None);
-        let all = Origins::new(vec!["*".to_owned()], None);
+        let listed = ["https://Example.org:443", "http://example.net:80"].map(str::to_owned);
+        let some = Origins::new(&listed, None);
+        assert_eq!(some.listed(), ["https://example.org", "http://example.net"]);
+        let all = Origins::new(&["*".to_owned()], None);
         for (origin, allowed) in [
             (None, true),
             (Some("http://127.0.0.1:50051"), true),
             (Some("HTTP://127.0.0.1:50051"), false),
             (Some("https://127.0.0.1:50051"), true),
             (Some("https://example.org"), true),
-            (Some("https://EXAMPLE.org"), true),
+            (Some("http://example.net"), true),
+            (Some("http://example.org"), false),
             (Some("https://example.org.evil.net"), false),
             (Some("http://127.0.0.1:8080"), false),
             (Some("https://evil.net"), false),
@@ -241,9 +278,27 @@ mod tests {
         }
     }
 
+    #[tokio::test(start_paused = true)]
+    async fn questions_of_browsers_whether_they_may_call_count() {
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let answer = service_fn(|_: Request<()>| {
+            std::future::ready(Ok::<_, Infallible>(Response::new(Body::empty())))
+        });
+        let layer = OriginLayer::new(Origins::new(&[], None), Arc::clone(&limits));
+        let mut services = layer.layer(answer);
+        let mut ask = || {
+            let request = Request::options("http://here/chefshat.v1.PlayService/Play").body(());
+            services.call(request.expect("a request")).now_or_never()
+        };
+        let answered = (0..=CALLS_AT_ONCE).filter(|_| ask().is_some()).count() as u64;
+        assert_eq!(answered, CALLS_AT_ONCE + 1);
+        assert!(ask().is_none(), "it waits");
+        assert!(!limits.wait(Key::Local).is_zero());
+    }
+
     #[test]
     fn a_default_port_is_none() {
-        let own = Origins::new(Vec::new(), None);
+        let own = Origins::new(&[], None);
         for (host, origin, allowed) in [
             ("chef.example.org:443", "https://chef.example.org", true),
             ("chef.example.org:80", "http://chef.example.org", true),
@@ -260,8 +315,8 @@ mod tests {
     #[test]
     fn a_server_for_this_machine_has_only_names_of_this_machine() {
         let listed = vec!["chef.example.org".to_owned()];
-        let here = Origins::new(Vec::new(), Some(listed));
-        let anywhere = Origins::new(Vec::new(), None);
+        let here = Origins::new(&[], Some(listed));
+        let anywhere = Origins::new(&[], None);
         for (host, allowed) in [
             ("localhost:50051", true),
             ("LOCALHOST", true),
