@@ -11,7 +11,7 @@ use axum::serve::Listener;
 use chefshat_tournament::{State, Tournament};
 use http::Response;
 use hyper::server::conn::http1;
-use hyper_util::rt::TokioIo;
+use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric};
@@ -21,13 +21,12 @@ use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Unit;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
 use tower::Layer as _;
 use tower::util::MapResponse;
 
 use crate::tls::Tls;
 use crate::web::{OriginLayer, Origins};
-use chefshat_admission::limits::{CallLimits, Shares};
+use chefshat_admission::limits::{CallLimits, FairSemaphore, Key, Shares};
 use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
 use chefshat_base::tasks::short;
@@ -38,15 +37,24 @@ use chefshat_store::DiskUsage;
 /// The media type of the answers.
 const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// Connections at a time; others wait.
-const MAX_CONNECTIONS: usize = 8;
+/// Connections at a time, of which each address has its share; others are closed.
+const MAX_CONNECTIONS: usize = 64;
+/// Longest time until the request of a connection has arrived.
+const REQUEST_TIME_LIMIT: Duration = Duration::from_secs(2);
 /// Longest time of a connection, which serves one request.
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
 /// Answers `GET /metrics` on a listener, without end. `origins`: under which names; no page needs
 /// the metrics.
 pub async fn serve(listener: TcpListener, metrics: Arc<Metrics>, origins: Origins) {
-    serve_within(listener, metrics, origins, MAX_CONNECTIONS, TIME_LIMIT).await;
+    serve_within(
+        listener,
+        metrics,
+        origins,
+        MAX_CONNECTIONS,
+        REQUEST_TIME_LIMIT,
+    )
+    .await;
 }
 
 async fn serve_within(
@@ -54,7 +62,7 @@ async fn serve_within(
     metrics: Arc<Metrics>,
     origins: Origins,
     max_connections: usize,
-    time_limit: Duration,
+    request_time_limit: Duration,
 ) {
     let answer = move || {
         let metrics = Arc::clone(&metrics);
@@ -66,18 +74,24 @@ async fn serve_within(
     });
     let limits = Arc::new(CallLimits::new(Shares::default()));
     let checked = OriginLayer::new(origins, limits).layer(router);
-    let places = Arc::new(Semaphore::new(max_connections));
-    // The semaphore is never closed.
-    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+    let places = FairSemaphore::new(max_connections, Shares::default());
+    loop {
         // After a failure it tries again.
-        let (stream, _) = Listener::accept(&mut listener).await;
-        let connection = http1::Builder::new().keep_alive(false).serve_connection(
-            TokioIo::new(stream),
-            TowerToHyperService::new(checked.clone()),
-        );
+        let (stream, address) = Listener::accept(&mut listener).await;
+        let Some(place) = places.try_take(Key::of_address(Some(address.ip()))) else {
+            continue;
+        };
+        let connection = http1::Builder::new()
+            .keep_alive(false)
+            .timer(TokioTimer::new())
+            .header_read_timeout(request_time_limit)
+            .serve_connection(
+                TokioIo::new(stream),
+                TowerToHyperService::new(checked.clone()),
+            );
         tokio::spawn(short("one connection, within its time limit", async move {
             // A client that fails or is too slow is disconnected.
-            let _ = tokio::time::timeout(time_limit, connection).await;
+            let _ = tokio::time::timeout(TIME_LIMIT, connection).await;
             drop(place);
         }));
     }
@@ -307,34 +321,57 @@ impl Encoder<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::{self, Read as _};
+    use std::net::SocketAddr;
 
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
     use tokio::net::TcpStream;
 
     use super::*;
 
-    #[tokio::test]
-    async fn an_idle_connection_gives_its_place_to_a_waiting_one() {
+    async fn scraped(mut connection: TcpStream) -> String {
+        let request = b"GET /metrics HTTP/1.1\r\nHost: it\r\n\r\n";
+        connection.write_all(request).await.expect("sent");
+        let mut answer = String::new();
+        connection.read_to_string(&mut answer).await.expect("text");
+        answer
+    }
+
+    async fn two_places(request_time_limit: Duration) -> SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
-        let limit = Duration::from_millis(20);
-        let anywhere = Origins::new(Vec::new(), None);
-        tokio::spawn(serve_within(listener, Arc::default(), anywhere, 1, limit));
-        let mut idle = std::net::TcpStream::connect(address).expect("it listens");
-        idle.set_nonblocking(true).expect("a socket");
-        // Time limits may end this one, too, on a busy machine.
+        let (metrics, anywhere) = (Arc::default(), Origins::new(&[], None));
+        tokio::spawn(serve_within(
+            listener,
+            metrics,
+            anywhere,
+            2,
+            request_time_limit,
+        ));
+        address
+    }
+
+    #[cfg(target_os = "linux")]
+    #[tokio::test]
+    async fn idle_connections_take_the_places_of_their_address_alone() {
+        let address = two_places(TIME_LIMIT).await;
+        let _idle = TcpStream::connect(address).await.expect("it listens");
+        let mut refused = TcpStream::connect(address).await.expect("it listens");
+        assert_eq!(refused.read(&mut [0]).await.expect("closed"), 0);
+        // Another address of this machine.
+        let other = tokio::net::TcpSocket::new_v4().expect("a socket");
+        let local = "127.0.0.2:0".parse().expect("an address");
+        other.bind(local).expect("an address of this machine");
+        let answer = scraped(other.connect(address).await.expect("it listens")).await;
+        assert!(answer.starts_with("HTTP/1.1 200 OK"), "{answer}");
+    }
+
+    #[tokio::test]
+    async fn an_idle_connection_is_closed() {
+        let address = two_places(Duration::from_millis(20)).await;
+        let mut idle = TcpStream::connect(address).await.expect("it listens");
         let mut answer = Vec::new();
-        while answer.is_empty() {
-            let mut waiting = TcpStream::connect(address).await.expect("it listens");
-            let request = b"GET /metrics HTTP/1.1\r\nHost: it\r\n\r\n";
-            waiting.write_all(request).await.expect("sent");
-            let _ = waiting.read_to_end(&mut answer).await;
-        }
-        let text = String::from_utf8(answer).expect("text");
-        assert!(text.starts_with("HTTP/1.1 200 OK"), "{text}");
-        let end = idle.read(&mut [0]).map_err(|error| error.kind());
-        assert_ne!(end, Err(io::ErrorKind::WouldBlock), "still open");
+        let _ = idle.read_to_end(&mut answer).await;
+        assert!(!answer.starts_with(b"HTTP/1.1 200"));
     }
 
     #[tokio::test]
