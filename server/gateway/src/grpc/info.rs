@@ -13,6 +13,7 @@ use chefshat_tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use tonic::{Request, Response, Status};
 
 use super::forward::Gateway;
+use super::limits::make_way;
 use super::lists;
 use super::lookup::Lookup;
 use super::status::{field, room_unknown};
@@ -110,6 +111,8 @@ impl ServerService for Info {
                     .get_server_info(request)
                     .await
             };
+            // A node that cannot be reached holds up no other calls.
+            make_way(request.extensions());
             let others = lists::of_others(gateway, ask).await;
             open_rooms += others.map(|info| info.open_rooms).sum::<u32>();
         }

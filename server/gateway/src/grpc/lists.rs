@@ -15,6 +15,7 @@ use tonic::{Response, Status};
 use tracing::debug;
 
 use super::forward::{FromPeer, Gateway};
+use super::limits::make_way;
 use super::pages;
 use chefshat_hosting::cluster::Peer;
 
@@ -79,6 +80,8 @@ pub(super) async fn list<L: Listing>(
     page_size: usize,
 ) -> Result<Response<L::Response>, Status> {
     if let Some(gateway) = extensions.get::<Gateway>() {
+        // A node that cannot be reached holds up no other calls.
+        make_way(extensions);
         let page = everywhere(listing, gateway, page_token, page_size).await?;
         return Ok(Response::new(L::response(page)));
     }
