@@ -215,7 +215,7 @@ impl Lookup {
             && self.standing_in_room(caller, &handle, &header).await == Relation::Stranger
         {
             // One that does not exist is looked for at other nodes: this takes as long, and fails as that
-            // does.
+            // does. So for tournaments and studies.
             self.check_not_elsewhere(&FoundBy::from(id), Key::of_caller(caller), || true)
                 .await?;
             return Err(unknown());
@@ -297,6 +297,9 @@ impl Lookup {
         if handle.visibility() == Visibility::Private
             && standing_in_tournament(caller, &handle) == Relation::Stranger
         {
+            let found_by = FoundBy::from(id);
+            self.check_not_elsewhere(&found_by, Key::of_caller(caller), || true)
+                .await?;
             return Err(tournament_unknown());
         }
         check(caller, |caller| caller.reaches_tournament(handle.id()))?;

@@ -130,10 +130,15 @@ impl StudyCalls {
     ) -> Result<Arc<StudyHandle>, Status> {
         let is_operator = caller.role == Role::Admin && caller.scope.is_none();
         let id = Id::parse(id).ok_or_else(study_unknown)?;
-        let handle = self.here(id, Key::of_caller(caller)).await?;
-        handle
-            .filter(|handle| handle.is_owner(token) || (is_operator && token.is_empty()))
-            .ok_or_else(study_unknown)
+        let key = Key::of_caller(caller);
+        let handle = self.here(id, key).await?.ok_or_else(study_unknown)?;
+        if handle.is_owner(token) || (is_operator && token.is_empty()) {
+            return Ok(handle);
+        }
+        // As for rooms: one that does not exist is looked for at other nodes.
+        let found_by = FoundBy::from(id);
+        (self.lookup.check_not_elsewhere(&found_by, key, || true)).await?;
+        Err(study_unknown())
     }
 
     fn links(&self, handle: &StudyHandle, from: u32, count: usize) -> Vec<v1::StudyLink> {
