@@ -24,8 +24,8 @@ use super::limits::charged;
 use super::lookup::Lookup;
 use super::pages;
 use super::status::{
-    Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
-    tournament_unknown,
+    Refusal, field, owner_unreachable, reader_too_slow, room_unknown, shutting_down, status,
+    store_failed, tournament_unknown,
 };
 use super::tournaments;
 use crate::connections::{Client, Connections};
@@ -197,7 +197,7 @@ impl AdminService for AdminCalls {
         let participants = Arc::clone(&self.participants);
         let gathering = async move { participants.export(&who, &lines).await };
         let forwarding = async move {
-            let mut count = 0_u64;
+            let (mut count, mut is_read) = (0_u64, true);
             while let Some(line) = exported.recv().await {
                 count += 1;
                 let response = v1::ExportParticipantResponse {
@@ -205,15 +205,17 @@ impl AdminService for AdminCalls {
                     ..v1::ExportParticipantResponse::default()
                 };
                 let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
-                if sent.await.is_err() {
+                is_read = sent.await.is_ok();
+                if !is_read {
                     break;
                 }
             }
-            (sender, count)
+            (sender, count, is_read)
         };
         tokio::spawn(short("one call", async move {
-            let (gathered, (sender, count)) = tokio::join!(gathering, forwarding);
+            let (gathered, (sender, count, is_read)) = tokio::join!(gathering, forwarding);
             let last = match gathered {
+                _ if !is_read => Err(reader_too_slow("the export", FOLLOW_SEND_TIMEOUT)),
                 Ok(skipped) if count == 0 && skipped.named.is_empty() => Err(status(
                     Code::NotFound,
                     "PARTICIPANT_UNKNOWN",

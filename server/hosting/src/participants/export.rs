@@ -185,13 +185,17 @@ impl ParticipantData {
                         "elapsedUs": chunk.elapsed_us,
                         "values": chunk.values,
                     }, "seat": seat, "gameId": game_id });
-                    // That nobody receives them is noticed by what is sent next.
+                    // That nobody receives them is noticed below.
                     let _ = sender.blocking_send(line.to_string());
                 };
                 samples::read(&path, send).map(drop)
             })
         });
-        Ok(sending.await??)
+        sending.await??;
+        match sheet.sender.is_closed() {
+            true => Err(DataError::Gone),
+            false => Ok(()),
+        }
     }
 
     /// Sends the games that are in files alone, such as imported ones.
