@@ -24,9 +24,9 @@ use crate::tasks::short;
 /// Why a request has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum PostError {
-    /// The address is not one.
-    #[error("{0:?} is not an address; an example is https://example.org/chefshat")]
-    Address(String),
+    /// The address, which may contain a secret, is not one.
+    #[error("this is not an address; an example is https://example.org/chefshat")]
+    Address,
     /// The authorities cannot be read.
     #[error("the certificate authorities cannot be read: {0}")]
     Authorities(String),
@@ -88,7 +88,7 @@ impl Target {
     /// # Errors
     /// The address or the file cannot be used.
     pub fn new(url: &str, ca: Option<&Path>) -> Result<Self, PostError> {
-        let wrong = || PostError::Address(url.to_owned());
+        let wrong = || PostError::Address;
         let uri: Uri = url.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|host| !host.is_empty());
         let host = host.ok_or_else(wrong)?;

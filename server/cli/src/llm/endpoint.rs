@@ -222,7 +222,7 @@ impl Endpoint {
         let address = address.trim_end_matches('/');
         let address = address.strip_suffix(PATH).unwrap_or(address);
         let target = Target::new(&format!("{address}{PATH}"), None).map_err(|error| match error {
-            PostError::Address(_) => format!(
+            PostError::Address => format!(
                 "{address:?} is not the address of a server of language models; an example is http://127.0.0.1:8080/v1"
             ),
             error => error.to_string(),
