@@ -66,6 +66,16 @@ fn parse(entry: &[u8]) -> Option<IpAddr> {
     Some(address.to_canonical())
 }
 
+/// A network of addresses of IPv4 that are written as those of IPv6, as one of IPv4: so are the
+/// addresses that are looked for in it.
+fn canonical(network: IpNet) -> IpNet {
+    let mapped = match (network.addr().to_canonical(), network.prefix_len()) {
+        (address @ IpAddr::V4(_), length @ 96..) => IpNet::new(address, length - 96).ok(),
+        _ => None,
+    };
+    mapped.unwrap_or(network)
+}
+
 impl FromStr for TrustedProxy {
     type Err = String;
 
@@ -76,7 +86,7 @@ impl FromStr for TrustedProxy {
         }
         let single = || IpAddr::from_str(text).map(IpNet::from);
         let network = text.parse().or_else(|_| single());
-        network.map(Self::Network).map_err(|_| {
+        network.map(canonical).map(Self::Network).map_err(|_| {
             "use an address or a network, for example 127.0.0.1 or 10.0.0.0/8, or unix for the server's unix socket"
                 .to_owned()
         })

@@ -128,6 +128,10 @@ mod tests {
             assert_eq!(seen, client, "{peer} {headers:?}");
         }
         assert_eq!(seen(&["unix"], "unix", &["1.1.1.1"]), "1.1.1.1");
+        for mapped in ["::ffff:10.1.2.3", "::ffff:10.0.0.0/104"] {
+            assert_eq!(seen(&[mapped], "10.1.2.3", &["1.1.1.1"]), "1.1.1.1");
+            assert_eq!(seen(&[mapped], "11.1.2.3", &["1.1.1.1"]), "11.1.2.3");
+        }
         assert_eq!(seen(&["unix"], "127.0.0.1", &["1.1.1.1"]), "127.0.0.1");
     }
 
