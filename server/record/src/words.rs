@@ -26,6 +26,18 @@ pub fn reason(source: v1::DecisionSource) -> Option<&'static str> {
     }
 }
 
+/// Whether a character is invisible, so that texts that differ in it look alike: joiners, direction
+/// marks, separators of lines, fillers, variation selectors, tags. Those are Unicode's
+/// `Default_Ignorable_Code_Point`, marks of annotations and the blank Braille pattern.
+pub fn is_invisible(letter: char) -> bool {
+    matches!(letter,
+        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}'
+        | '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}'
+        | '\u{ffa0}' | '\u{fff0}'..='\u{fffb}' | '\u{1bca0}'..='\u{1bca3}'
+        | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
+}
+
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
 pub fn ordinal(place: u32) -> String {
     let ending = match (place % 100, place % 10) {

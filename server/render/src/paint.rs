@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use chefshat_record::words::is_invisible;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
@@ -215,7 +216,9 @@ impl Painter {
     pub(super) fn fit(&self, text: &str, size: f32, bold: bool, width: f32) -> String {
         let letters: Vec<char> = text
             .chars()
-            .filter(|&letter| !is_invisible(letter))
+            // SVG forbids control characters and some others.
+            .filter(|&letter| !letter.is_control() && !is_invisible(letter))
+            .filter(|letter| !matches!(letter, '\u{fffe}' | '\u{ffff}'))
             .flat_map(|letter| self.in_font(letter))
             .take(MAX_LETTERS)
             .collect();
@@ -317,12 +320,4 @@ fn letters() -> BTreeSet<char> {
     letters
         .filter_map(|(letter, _)| char::from_u32(letter))
         .collect()
-}
-
-/// Whether a character is a control character, which SVG forbids, or invisible: direction marks,
-/// joiners, variation selectors.
-fn is_invisible(letter: char) -> bool {
-    letter.is_control()
-        || matches!(letter, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}')
-        || matches!(letter, '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' | '\u{e0000}'..='\u{e0fff}')
 }

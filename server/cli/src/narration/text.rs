@@ -1,6 +1,7 @@
 //! Text of known width: styled pieces, wrapped items, names that are safe to print.
 
 use anstyle::{AnsiColor, Color, Style};
+use chefshat_record::words::is_invisible;
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
 /// Maximum columns of a line.
@@ -145,9 +146,9 @@ pub fn row(words: &str, text: &str) -> String {
     format!("{}\n", line.as_str())
 }
 
-/// Text from outside, made safe to print: without control characters, at most `width` columns.
+/// Text from outside, made safe to print: without control and invisible characters, at most `width` columns.
 pub fn clean(text: &str, width: usize) -> String {
-    let shown = |letter: &char| !steers(*letter);
+    let shown = |letter: &char| !letter.is_control() && !is_invisible(*letter);
     let safe: String = text.chars().filter(shown).collect();
     if columns(&safe) <= width {
         return safe;
@@ -165,12 +166,6 @@ pub fn clean(text: &str, width: usize) -> String {
     cut
 }
 
-/// Control characters, and characters that change the direction or joining of text.
-fn steers(letter: char) -> bool {
-    letter.is_control()
-        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
-}
-
 #[cfg(test)]
 mod tests {
     use crate::narration::text::*;
@@ -181,7 +176,7 @@ mod tests {
             ("Greta", "Greta"),
             ("Wilhelmina the Great", "Wilhelmina the…"),
             ("a\u{1b}[31mb\u{7}", "a[31mb"),
-            ("\u{202e}drow", "drow"),
+            ("\u{202e}drow\u{fe00}\u{e0041}", "drow"),
             ("料理長のとても長い名前", "料理長のとても…"),
             ("random_unmasked", "random_unmasked"),
         ];

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use chefshat_record::convert::FieldProblem;
+use chefshat_record::words::is_invisible;
 use sha2::{Digest as _, Sha256};
 
 /// Longest name of a room or participant, characters.
@@ -48,10 +49,7 @@ pub(super) fn checked_text(
             ),
         ));
     }
-    if text
-        .chars()
-        .any(|letter| letter.is_control() || is_invisible(letter))
-    {
+    if has_invisible(text) {
         return Err(FieldProblem::new(
             field,
             "invisible characters and direction marks are not allowed: they make names look alike",
@@ -60,18 +58,48 @@ pub(super) fn checked_text(
     Ok(text.to_owned())
 }
 
-/// Whether a character is invisible: joiners, direction marks, fillers, tags (Unicode's category
-/// Cf, the Hangul fillers, the grapheme joiner and the blank Braille pattern).
-fn is_invisible(letter: char) -> bool {
-    matches!(letter,
-        '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
-        | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{2800}' | '\u{3164}' | '\u{feff}' | '\u{ffa0}'
-        | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
+/// Whether a text has characters that are not seen: control characters and invisible ones. The sign
+/// that a symbol is a picture (U+FE0F), which keyboards add to some, counts as seen after one.
+fn has_invisible(text: &str) -> bool {
+    let mut before = None;
+    text.chars().any(|letter| {
+        let is_symbol = |it: char| !it.is_ascii() && !it.is_alphanumeric() && !is_invisible(it);
+        let is_sign = letter == '\u{fe0f}' && before.is_some_and(is_symbol);
+        before = Some(letter);
+        letter.is_control() || is_invisible(letter) && !is_sign
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::convert::name_fingerprint;
+    use crate::convert::{checked_name, name_fingerprint};
+
+    #[test]
+    fn names_that_look_like_others_are_refused() {
+        for name in ["Ada", "Zoë", "料理長", "Ada ☕\u{fe0f}", "\u{2764}\u{fe0f}"] {
+            assert_eq!(checked_name("name", name, 1).ok().as_deref(), Some(name));
+        }
+        for invisible in [
+            "\u{fe00}",
+            "\u{fe0f}",
+            "\u{180b}",
+            "\u{17b4}",
+            "\u{1d173}",
+            "\u{1bca0}",
+            "\u{200d}",
+            "\u{e0041}",
+            "\u{3164}",
+            "\u{7}",
+        ] {
+            for name in [
+                format!("Ada{invisible}"),
+                format!("A{invisible}da"),
+                format!("☕{invisible}{invisible}"),
+            ] {
+                assert!(checked_name("name", &name, 1).is_err(), "{name:?}");
+            }
+        }
+    }
 
     #[test]
     fn a_fingerprint_depends_on_the_name_and_its_key_alone() {
