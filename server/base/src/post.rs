@@ -20,6 +20,7 @@ use tokio_rustls::TlsConnector;
 use tokio_util::task::AbortOnDropHandle;
 
 use crate::tasks::short;
+use crate::tls_files::add_authorities;
 
 /// Why a request has no answer.
 #[derive(Debug, thiserror::Error)]
@@ -201,9 +202,8 @@ fn connector(ca: Option<&Path>) -> Result<TlsConnector, PostError> {
         Some(path) => {
             let read: Result<Vec<_>, _> =
                 CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
-            for certificate in read.map_err(|problem| unreadable(&problem))? {
-                (roots.add(certificate)).map_err(|problem| unreadable(&problem))?;
-            }
+            let read = read.map_err(|problem| unreadable(&problem))?;
+            add_authorities(&mut roots, path, read);
         }
         None => {
             let found = rustls_native_certs::load_native_certs();

@@ -7,6 +7,7 @@ use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::server::WebPkiClientVerifier;
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
+use tracing::warn;
 use x509_cert::Certificate;
 use x509_cert::der::Decode as _;
 
@@ -138,10 +139,25 @@ fn roots(
     authorities: Vec<CertificateDer<'static>>,
 ) -> Result<RootCertStore, TlsError> {
     let mut roots = RootCertStore::empty();
-    for certificate in authorities {
-        (roots.add(certificate)).map_err(|error| bad_authority(path, &error))?;
+    add_authorities(&mut roots, path, authorities);
+    match roots.is_empty() {
+        true => Err(bad_authority(path, &"none of its certificates can be used")),
+        false => Ok(roots),
     }
-    Ok(roots)
+}
+
+/// Trusts these certificates of a file. Those that cannot be used, such as very old ones, are left
+/// out: a file of many authorities may have some.
+pub(crate) fn add_authorities(
+    roots: &mut RootCertStore,
+    path: &Path,
+    authorities: Vec<CertificateDer<'static>>,
+) {
+    let (_, left_out) = roots.add_parsable_certificates(authorities);
+    if left_out > 0 {
+        let path = path.display();
+        warn!(%path, left_out, "certificates of authorities that cannot be used are left out");
+    }
 }
 
 /// When a certificate expires, in seconds since the Unix epoch; `None` if it is of a form that cannot be

@@ -59,15 +59,25 @@ impl Tls {
     pub async fn follow(self: Arc<Self>) {
         loop {
             sleep(INTERVAL).await;
-            let mut watch = (self.watch.lock()).expect("no code that holds this lock can panic");
-            let read = watch.read_changed(|| {
-                self.current.store(Arc::new(self.files.read()?));
-                info!("the certificate was read again");
-                Ok::<_, TlsError>(())
-            });
-            if let Err(error) = read {
-                error!(%error, "the certificate stays as it was");
+            let tls = Arc::clone(&self);
+            // A disk may hang.
+            let reading = tokio::task::spawn_blocking(move || tls.read_if_changed());
+            if let Err(error) = reading.await {
+                error!(%error, "the certificate was not read");
             }
+        }
+    }
+
+    /// Reads the files again if they have changed. Blocks.
+    fn read_if_changed(&self) {
+        let mut watch = (self.watch.lock()).expect("no code that holds this lock can panic");
+        let read = watch.read_changed(|| {
+            self.current.store(Arc::new(self.files.read()?));
+            info!("the certificate was read again");
+            Ok::<_, TlsError>(())
+        });
+        if let Err(error) = read {
+            error!(%error, "the certificate stays as it was");
         }
     }
 
@@ -296,6 +306,22 @@ mod tests {
 
     fn handshakes() -> Arc<Handshakes> {
         Handshakes::new(Shares::default(), Arc::default()).expect("a thread")
+    }
+
+    #[test]
+    fn an_authority_that_cannot_be_used_is_left_out() {
+        let (folder, tls, _) = server();
+        let authority = folder.path().join("authorities.pem");
+        let files = TlsFiles {
+            client_authority: Some(authority.clone()),
+            ..tls.files.clone()
+        };
+        let unusable = "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n";
+        std::fs::write(&authority, unusable).expect("written");
+        files.read().expect_err("no authority is left");
+        let good = std::fs::read_to_string(&files.certificate).expect("a certificate");
+        std::fs::write(&authority, format!("{unusable}{good}")).expect("written");
+        files.read().expect("one is left");
     }
 
     #[tokio::test]

@@ -108,8 +108,7 @@ fn bound(task: LongTask, time: Duration) -> u64 {
         // They beat, and look for what nobody owns.
         LongTask::Node => 300,
         // Every second, on another thread.
-        LongTask::TokenFile => 120,
-        LongTask::Certificates => 60,
+        LongTask::TokenFile | LongTask::Certificates => 120,
         // Every 5 seconds.
         LongTask::StalledConnections | LongTask::Probing => 12,
         // At most heartbeats, every 15 seconds, and attempts to deliver.
