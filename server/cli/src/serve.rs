@@ -183,7 +183,7 @@ impl Settings {
             .into());
         }
         let settings = WebhookSettings::new(url, secret, self.webhook_ca.as_deref())
-            .map_err(|error| error.to_string())?;
+            .map_err(|error| format!("--webhook: {error}"))?;
         Ok(Some(settings))
     }
 
