@@ -3,6 +3,7 @@
 //! they are the same. `GetServerInfo` is not repeated: it tells at once whether the server answers.
 //! The Python SDK repeats the same calls.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use rand::TryRng as _;
@@ -54,29 +55,32 @@ pub async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
 {
-    let mut attempt = 1;
-    let mut lost = ATTEMPTS;
+    // Counted by reason, as each has its own limit.
+    let mut failures = BTreeMap::new();
+    let mut lost = (None, ATTEMPTS);
     loop {
         let error = match send().await {
             Ok(response) => return Ok(response.into_inner()),
             Err(status) => Error::from(status),
         };
-        let attempts = match error.reason() {
+        let (reason, attempts) = match error.reason() {
             None if may_retry(error.code()) => lost,
-            Some(OWNER_UNREACHABLE | NODE_NOT_REACHED) => OWNER_ATTEMPTS,
+            Some(OWNER_UNREACHABLE) => (Some(OWNER_UNREACHABLE), OWNER_ATTEMPTS),
+            Some(NODE_NOT_REACHED) => (Some(NODE_NOT_REACHED), OWNER_ATTEMPTS),
             Some(SHUTTING_DOWN) => {
-                lost = RESTART_ATTEMPTS;
+                lost = (Some(SHUTTING_DOWN), RESTART_ATTEMPTS);
                 lost
             }
             // The server has refused it.
-            _ => 1,
+            _ => return Err(error),
         };
-        if attempt >= attempts {
+        let failed = failures.entry(reason).or_insert(0);
+        *failed += 1;
+        if *failed >= attempts {
             return Err(error);
         }
-        let pause = FIRST_PAUSE * 2_u32.pow((attempt - 1).min(8));
+        let pause = FIRST_PAUSE * 2_u32.pow((*failed - 1).min(8));
         tokio::time::sleep(pause.min(LONGEST_PAUSE)).await;
-        attempt += 1;
     }
 }
 
@@ -174,5 +178,23 @@ mod tests {
         assert_eq!(found.expect("it is back"), 60);
         let never = repeated(answers(stops, RESTART_ATTEMPTS)).await;
         never.expect_err("given up");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn each_reason_has_its_own_attempts() {
+        // A server that is back, and that others do not reach yet.
+        let back = |attempt| {
+            Some(if attempt < 30 {
+                SHUTTING_DOWN
+            } else {
+                NODE_NOT_REACHED
+            })
+        };
+        let found = repeated(answers(back, 32)).await;
+        assert_eq!(found.expect("it is reached"), 32);
+        // A room that changes servers, and one lost connection.
+        let moving = |attempt| (attempt != 6).then_some(OWNER_UNREACHABLE);
+        let found = repeated(answers(moving, 8)).await;
+        assert_eq!(found.expect("it has moved"), 8);
     }
 }
