@@ -48,8 +48,13 @@ pub trait Agent: Send {
     /// Called when the seat is attached: at the start, and after every reconnection.
     fn on_attached(&mut self, _attached: &v1::Attached) {}
 
-    /// Called for every event of the game, once and in order, also across lost connections.
+    /// Called for every event of the game, once and in order, also across lost connections, except
+    /// for those before a snapshot.
     fn on_event(&mut self, _event: &v1::GameEvent) {}
+
+    /// Called in place of events that the room of a long game no longer has: when the seat is attached
+    /// late, or again after a long outage. The start of the game may be among them.
+    fn on_snapshot(&mut self, _snapshot: &v1::Snapshot) {}
 
     /// Called when the game waits for a different seat among the others, or for none of them (no
     /// `seat`), and with none when a new connection begins. Only for seats that receive events at
@@ -82,6 +87,9 @@ macro_rules! forward_agent {
             }
             fn on_event(&mut self, event: &v1::GameEvent) {
                 (**self).on_event(event);
+            }
+            fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+                (**self).on_snapshot(snapshot);
             }
             fn on_awaited(&mut self, awaited: &v1::Awaited) {
                 (**self).on_awaited(awaited);

@@ -35,6 +35,13 @@ impl RandomAgent {
         nth_in(mask, n as usize)
     }
 
+    fn begin(&mut self, start: &v1::GameStarted) {
+        if let Some(space) = &start.action_space {
+            self.turn_actions = space.turn_actions;
+            self.actions = space.size;
+        }
+    }
+
     /// A number below `n`, by multiplication: the bias is negligible at these sizes, and the result
     /// is the same in every version.
     fn below(&mut self, n: u32) -> u32 {
@@ -56,11 +63,14 @@ impl Agent for RandomAgent {
     }
 
     fn on_event(&mut self, event: &v1::GameEvent) {
-        if let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind
-            && let Some(space) = &start.action_space
-        {
-            self.turn_actions = space.turn_actions;
-            self.actions = space.size;
+        if let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind {
+            self.begin(start);
+        }
+    }
+
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        if let Some(start) = &snapshot.game_started {
+            self.begin(start);
         }
     }
 }
@@ -96,6 +106,25 @@ mod tests {
         };
         assert_eq!(play(7), play(7));
         assert_ne!(play(7), play(8));
+    }
+
+    #[test]
+    fn a_snapshot_tells_the_number_of_actions() {
+        let mut agent = RandomAgent::new(3);
+        agent.on_snapshot(&v1::Snapshot {
+            game_started: Some(v1::GameStarted {
+                action_space: Some(v1::ActionSpace {
+                    turn_actions: 7,
+                    size: 9,
+                    ..v1::ActionSpace::default()
+                }),
+                ..v1::GameStarted::default()
+            }),
+            ..v1::Snapshot::default()
+        });
+        for _ in 0..100 {
+            assert!(agent.decide(&request(&[], v1::DecisionKind::Turn)).0 < 7);
+        }
     }
 
     #[test]

@@ -100,6 +100,7 @@ impl<A: Agent> SeatSession<A> {
                     self.follow(event);
                 }
             }
+            Update::Snapshot(snapshot) => self.agent.on_snapshot(&snapshot),
             Update::Awaited(awaited) => self.awaited(&awaited),
             // Whether a substitute plays for the seat, where no event says so.
             Update::Substitution(substitution) => self.substituted = substitution.active,
@@ -109,10 +110,7 @@ impl<A: Agent> SeatSession<A> {
                 let (seat, reason) = (self.seat, refused.reason);
                 tracing::warn!(seat, reason, "{}", refused.message);
             }
-            Update::Snapshot(_)
-            | Update::Attached(_)
-            | Update::Detached(_)
-            | Update::Entered(_) => {}
+            Update::Attached(_) | Update::Detached(_) | Update::Entered(_) => {}
         }
         false
     }

@@ -49,6 +49,9 @@ impl Agent for Scripted {
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.log_line(format!("event {}", event.sequence));
     }
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.log_line(format!("snapshot before {}", snapshot.next_sequence));
+    }
     fn on_awaited(&mut self, awaited: &v1::Awaited) {
         self.log_line(format!("awaited {:?}", awaited.seat));
     }
@@ -252,6 +255,21 @@ fn answers_of_one_response_go_out_as_one_request_after_all_its_updates() {
     assert_eq!(harness.log(0), ["event 1", "event 2", "decide 9 None"]);
     assert_eq!(harness.log(1), ["event 1", "decide 4 None"]);
     assert_eq!(harness.log(2), ["event 1"]);
+}
+
+#[test]
+fn a_snapshot_reaches_the_agent_in_place_of_events() {
+    let mut harness = Harness::seated(&[5]);
+    let snapshot = v1::Snapshot {
+        next_sequence: 900,
+        ..v1::Snapshot::default()
+    };
+    let sent = harness.receive(vec![
+        (0, Update::Snapshot(Box::new(snapshot))),
+        (0, decision(1)),
+    ]);
+    assert_eq!(sent, ["0:1=5"]);
+    assert_eq!(harness.log(0), ["snapshot before 900", "decide 1 None"]);
 }
 
 #[test]

@@ -313,6 +313,10 @@ impl<A: Agent> Agent for Paced<A> {
         self.agent.on_event(event);
     }
 
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.agent.on_snapshot(snapshot);
+    }
+
     fn on_result(&mut self, result: &v1::AnswerResult) {
         self.agent.on_result(result);
         self.progress.send_modify(|rooms| rooms[self.room] += 1);

@@ -218,6 +218,10 @@ impl<A: Agent> Agent for Recorded<A> {
         }
     }
 
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.agent.on_snapshot(snapshot);
+    }
+
     fn on_result(&mut self, result: &v1::AnswerResult) {
         self.agent.on_result(result);
         let key = self.key(result.decision_id);

@@ -92,6 +92,21 @@ impl RemoteAgent {
 }
 
 impl RemoteAgent {
+    /// Begins a game, or resumes one whose events before this are unknown.
+    fn begin(&mut self, start: &v1::GameStarted) {
+        self.rules = match start.rules.as_ref().map(rules_from_proto) {
+            Some(Ok(rules)) => Some(rules),
+            Some(Err(problem)) => {
+                warn!(%problem, "the rules of the game cannot be read");
+                None
+            }
+            None => None,
+        };
+        if let (Some((maker, seed)), Some(rules)) = (&self.maker, &self.rules) {
+            self.agent = maker.agent(rules, *seed);
+        }
+    }
+
     /// Shows an event of a Shift to an agent that follows them.
     fn follow(&mut self, event: &v1::GameEvent) {
         let (Some(kind), Some(rules), Some(seat)) = (&event.kind, &self.rules, self.seat) else {
@@ -126,19 +141,15 @@ impl Agent for RemoteAgent {
     }
 
     fn on_event(&mut self, event: &v1::GameEvent) {
-        let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind else {
-            return self.follow(event);
-        };
-        self.rules = match start.rules.as_ref().map(rules_from_proto) {
-            Some(Ok(rules)) => Some(rules),
-            Some(Err(problem)) => {
-                warn!(%problem, "the rules of the game cannot be read");
-                None
-            }
-            None => None,
-        };
-        if let (Some((maker, seed)), Some(rules)) = (&self.maker, &self.rules) {
-            self.agent = maker.agent(rules, *seed);
+        match &event.kind {
+            Some(v1::game_event::Kind::GameStarted(start)) => self.begin(start),
+            _ => self.follow(event),
+        }
+    }
+
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        if let Some(start) = &snapshot.game_started {
+            self.begin(start);
         }
     }
 }
@@ -230,11 +241,22 @@ mod tests {
     #[test]
     fn decides_remotely_as_it_does_inside_the_server() {
         let rules = RuleSetSpec::default().validate().expect("the standard");
-        for kind in AgentKind::ALL {
+        // Before its first decision a seat receives the start of the game or, if it is resumed late, a
+        // snapshot.
+        let ways = AgentKind::ALL.map(|kind| [(kind, false), (kind, true)]);
+        for (kind, is_late) in ways.into_iter().flatten() {
             let mut game = Game::new(rules, Seed([5; 32]), |_| {});
             let mut inside = BuiltInAgent::new(kind, [9; 32]);
             let mut remote = RemoteAgent::new(inside.clone(), Duration::ZERO);
-            remote.on_event(&started(&game));
+            match (is_late, started(&game).kind) {
+                (true, Some(v1::game_event::Kind::GameStarted(start))) => {
+                    remote.on_snapshot(&v1::Snapshot {
+                        game_started: Some(*start),
+                        ..v1::Snapshot::default()
+                    });
+                }
+                _ => remote.on_event(&started(&game)),
+            }
             let mut turns = 0;
             while game.shift() == 1 {
                 let decision = game.decision().expect("the first Shift is not the last");

@@ -653,6 +653,13 @@ impl Agent for LanguageModel {
             .take(Update::Events(v1::EventBatch { events }), now_ms);
     }
 
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.at_once.on_snapshot(snapshot);
+        let now_ms = self.now_ms();
+        let update = Update::Snapshot(Box::new(snapshot.clone()));
+        self.live.take(update, now_ms);
+    }
+
     fn on_result(&mut self, result: &v1::AnswerResult) {
         match result.status() {
             v1::AnswerStatus::Accepted => self.is_own = None,

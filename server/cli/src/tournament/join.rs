@@ -201,6 +201,10 @@ impl Agent for Teller {
         self.player.agent().on_event(event);
     }
 
+    fn on_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.player.agent().on_snapshot(snapshot);
+    }
+
     fn on_result(&mut self, result: &v1::AnswerResult) {
         self.player.agent().on_result(result);
     }
