@@ -10,7 +10,7 @@ use crate::kind::KindArg;
 use crate::name_key::NameKeyArg;
 use crate::numbers::seat_number;
 use chefshat_agents::{BuiltInAgent, RecordedPlayer};
-use chefshat_client::{Client, Outcome, PlayError, v1};
+use chefshat_client::{Client, Error, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
 use clap::Args;
 
@@ -31,7 +31,7 @@ use chefshat_server::convert::recorded_player;
                   replay imitates the player who had that seat in a recorded game: where it sees exactly what the player saw, it takes the \
                   same action, otherwise the action from the most similar situation (docs/branching.md).\n\n\
                   llm lets a language model play, on any server with the usual chat API (docs/mcp.md).\n\n\
-                  Exit code: 0 when the game finished, 1 when it was aborted, the seat was lost, or a model's fallback played too much of it."
+                  Exit code: 0 when the game finished, 1 when it was aborted, the seat was lost, a room of several --games had none, or a model's fallback played too much of it."
 )]
 pub(super) struct AgentCommand {
     /// The agent: random, greedy, trained, monte_carlo (searches on all cores; with a budget:
@@ -97,7 +97,21 @@ impl AgentCommand {
         let mut last_code = None;
         let mut all_played = true;
         for _ in 0..self.games {
-            let ticket = self.ticket(&client, &mut last_code).await?;
+            let ticket = match self.ticket(&client, &mut last_code).await {
+                Ok(ticket) => ticket,
+                Err(error) => {
+                    let Some(error) = self.without_seat(&error) else {
+                        return Err(error);
+                    };
+                    all_played = false;
+                    match self.json {
+                        true => say(refused_json(error))?,
+                        false => say(format_args!("there was no seat: {error}"))?,
+                    }
+                    continue;
+                }
+            };
+            player.begin();
             let played = client.play(ticket, player.agent()).await;
             all_played &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
             all_played &= player.has_played();
@@ -130,6 +144,16 @@ impl AgentCommand {
         }
     }
 
+    /// Why there is no seat in a room, if that of the next game may have one.
+    fn without_seat<'a>(&self, error: &'a CommandError) -> Option<&'a Error> {
+        let error = error.downcast_ref::<Error>().filter(|_| self.games > 1)?;
+        let reasons = ["ROOM_FULL", "GAME_STARTED", "GAME_OVER", "JOIN_CODE_WRONG"];
+        (error
+            .reason()
+            .is_some_and(|reason| reasons.contains(&reason)))
+        .then_some(error)
+    }
+
     /// Returns the ticket for the next game.
     async fn ticket(
         &self,
@@ -146,16 +170,16 @@ impl AgentCommand {
         };
         let name = self.name.clone().unwrap_or(default_name);
         let kind = self.kind_of.unwrap_or(kind);
+        *last_code = Some(code.clone());
         let joined = client
             .join(v1::JoinRoomRequest {
-                join_code: code.clone(),
+                join_code: code,
                 name: name.clone(),
                 kind: v1::ParticipantKind::from(kind).into(),
                 name_key: self.name_key.key()?,
                 ..v1::JoinRoomRequest::default()
             })
             .await?;
-        *last_code = Some(code);
         let waits = match joined.room.as_ref().map_or(0, free_seats) {
             0 => String::new(),
             1 => "waits for 1 other seat to be taken, then ".to_owned(),
@@ -202,6 +226,13 @@ fn as_json(played: &Result<Outcome, PlayError>) -> serde_json::Value {
             "event": "lost", "reason": error.reason(), "message": error.to_string(),
         }),
     }
+}
+
+/// A room without a seat, as JSON.
+fn refused_json(error: &Error) -> serde_json::Value {
+    serde_json::json!({
+        "event": "refused", "reason": error.reason(), "message": error.message(),
+    })
 }
 
 /// The result of a game for a seat, as a line for people.

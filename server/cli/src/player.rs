@@ -126,6 +126,13 @@ impl From<RemoteAgent> for Player {
 }
 
 impl Player {
+    /// Begins a game, which may end before its first event.
+    pub(super) fn begin(&mut self) {
+        if let Self::Model(model) = self {
+            model.begin();
+        }
+    }
+
     /// The result of its last game in words, with what that has taken.
     pub(super) fn in_words(&self, result: &str) -> String {
         match self {

@@ -339,6 +339,15 @@ impl LanguageModel {
         (fallbacks + unrequested) as f64 <= most
     }
 
+    /// Begins a game, of which nothing is known and nothing is spent.
+    pub(crate) fn begin(&mut self) {
+        self.live = Live::new(GameView::default(), None);
+        self.spent = Spent::default();
+        (self.answered, self.left_open, self.described) = (None, None, None);
+        self.is_own = None;
+        (self.silent, self.annotated) = (0, 0);
+    }
+
     fn now_ms(&self) -> u64 {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
@@ -636,13 +645,6 @@ impl Agent for LanguageModel {
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.at_once.on_event(event);
         match &event.kind {
-            Some(Kind::GameStarted(_)) => {
-                self.live = Live::new(GameView::default(), self.live.me);
-                self.spent = Spent::default();
-                (self.answered, self.left_open, self.described) = (None, None, None);
-                self.is_own = None;
-                (self.silent, self.annotated) = (0, 0);
-            }
             Some(Kind::ShiftStarted(_)) => self.silent = 0,
             Some(kind) => self.note_source(kind),
             None => {}
@@ -720,6 +722,28 @@ mod tests {
         }
         assert!((50..100).contains(&with_answers), "{with_answers}");
         assert!(bytes < MAX_ANNOTATION_BYTES_PER_GAME, "{bytes}");
+    }
+
+    #[test]
+    fn a_game_that_is_resumed_late_has_its_rules_and_the_next_costs_nothing_yet() {
+        let line = Line::parse_from(["llm", "--endpoint", "http://127.0.0.1:1/v1", "--model", "m"]);
+        let endpoint = line.llm.endpoint(None).expect("an address");
+        let mut model = line.llm.agent(endpoint, [0; 32]);
+        model.on_snapshot(&v1::Snapshot {
+            game_started: Some(v1::GameStarted {
+                rules: Some(v1::RuleSet {
+                    faces: Some(7),
+                    ..v1::RuleSet::default()
+                }),
+                ..v1::GameStarted::default()
+            }),
+            observation: Some(v1::Observation::default()),
+            next_sequence: 900,
+        });
+        assert_eq!(model.live.space().faces(), 7);
+        model.spend(90_000, None);
+        model.begin();
+        assert_eq!(model.spent(), Spent::default());
     }
 
     #[test]

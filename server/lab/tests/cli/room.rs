@@ -183,3 +183,24 @@ fn a_private_room_is_shown_with_its_owner_token() {
     }
     run(&url, &format!("room close {room_id} {owner}")).well();
 }
+
+#[test]
+fn an_agent_goes_on_after_a_room_without_a_seat() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let file = folder.path().join("code");
+    std::fs::write(&file, "BCDF2345").unwrap();
+    let file = file.to_str().unwrap();
+    let agent = format!("agent random --games 2 --json --code-file {file}");
+    let mut agent = Running::start(&url, &agent);
+    let stdout = agent.0.stdout.take().unwrap();
+    let mut lines = BufReader::new(stdout).lines().map(Result::unwrap);
+    let refused: Value = serde_json::from_str(&lines.next().unwrap()).unwrap();
+    assert_eq!(refused["event"], "refused");
+    assert_eq!(refused["reason"], "JOIN_CODE_WRONG");
+    let room = format!("room create --seat greedy*3 --target-shifts 1 --code-file {file}");
+    run(&url, &room).well();
+    let result: Value = serde_json::from_str(&lines.next().unwrap()).unwrap();
+    assert_eq!(result["event"], "result");
+    assert_eq!(agent.0.wait().unwrap().code(), Some(1));
+}
