@@ -2,7 +2,12 @@
 //! tournaments, `vector` those about games stepped in batches, `table` those about physical tables.
 //! A `Client` holds only a connection: it is cheap to clone, and calls may run in parallel.
 
+use std::pin::pin;
+
+use futures::{Stream, TryStreamExt as _};
+use prost::Message as _;
 use tonic::transport::Channel;
+use tonic::{Status, Streaming};
 
 use crate::connection::{self, ConnectOptions, Connection, MAX_RESPONSE_BYTES};
 use crate::repeat::{identify, repeated};
@@ -14,6 +19,11 @@ use crate::v1::record_service_client::RecordServiceClient;
 use crate::v1::room_service_client::RoomServiceClient;
 use crate::v1::server_service_client::ServerServiceClient;
 use crate::{Agent, Error, Outcome, PlayError, PlayOptions, Spectator, run, v1};
+
+/// Maximum size of a record, as of its file on disk, bytes.
+const MAX_RECORD_BYTES: usize = 512 << 20;
+/// Maximum number of lines of a record, as of its file on disk.
+const MAX_RECORD_LINES: usize = 2_100_000;
 
 /// A connection to a server, restored automatically when it is lost.
 #[derive(Clone, Debug)]
@@ -237,23 +247,41 @@ impl Client {
     /// The record of a game that has ended, line by line.
     ///
     /// # Errors
-    /// `GAME_UNKNOWN`, `GAME_RUNNING`.
+    /// `GAME_UNKNOWN`, `GAME_RUNNING`; `RECORD_TOO_LARGE` if the server sends more than a record can
+    /// have.
     pub async fn record(&self, game_id: impl Into<String>) -> Result<Vec<v1::RecordLine>, Error> {
+        let parts = self.record_parts(game_id.into()).await?;
+        lines_of(parts, MAX_RECORD_BYTES, MAX_RECORD_LINES).await
+    }
+
+    /// The header of the record of a game that has ended.
+    ///
+    /// # Errors
+    /// `GAME_UNKNOWN`, `GAME_RUNNING`.
+    pub async fn record_header(
+        &self,
+        game_id: impl Into<String>,
+    ) -> Result<v1::RecordHeader, Error> {
+        let mut parts = self.record_parts(game_id.into()).await?;
+        let first = parts.message().await?.unwrap_or_default().lines.into_iter();
+        match first.map(|line| line.line).next().flatten() {
+            Some(v1::record_line::Line::Header(header)) => Ok(*header),
+            _ => Err(Error::incomplete("header")),
+        }
+    }
+
+    async fn record_parts(
+        &self,
+        game_id: String,
+    ) -> Result<Streaming<v1::GetRecordResponse>, Error> {
         let service =
             RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
-        let request = v1::GetRecordRequest {
-            game_id: game_id.into(),
-        };
-        let opened = repeated(|| {
+        let request = v1::GetRecordRequest { game_id };
+        repeated(|| {
             let (mut service, request) = (service.clone(), request.clone());
             async move { service.get_record(request).await }
-        });
-        let mut stream = opened.await?;
-        let mut lines = Vec::new();
-        while let Some(part) = stream.message().await? {
-            lines.extend(part.lines);
-        }
-        Ok(lines)
+        })
+        .await
     }
 
     /// Puts a marker into the record of a room. Nobody but the owner of the room learns of it.
@@ -395,5 +423,46 @@ impl Client {
         let mut session = Session::new(seats, options);
         run::run(self.channel(), &mut session, &options.backoff).await;
         session.into_outcomes()
+    }
+}
+
+/// The lines of the parts of a record.
+async fn lines_of(
+    parts: impl Stream<Item = Result<v1::GetRecordResponse, Status>>,
+    most_bytes: usize,
+    most_lines: usize,
+) -> Result<Vec<v1::RecordLine>, Error> {
+    let mut parts = pin!(parts);
+    let (mut lines, mut bytes) = (Vec::new(), 0);
+    while let Some(part) = parts.try_next().await? {
+        bytes += part.encoded_len();
+        lines.extend(part.lines);
+        if bytes > most_bytes || lines.len() > most_lines {
+            return Err(Error::record_too_large());
+        }
+    }
+    Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::StreamExt as _;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_record_without_an_end_is_refused() {
+        let part = || v1::GetRecordResponse {
+            lines: vec![v1::RecordLine::default(); 10],
+        };
+        let endless = || futures::stream::repeat_with(move || Ok(part()));
+        let bytes = part().encoded_len();
+        for (most_bytes, most_lines) in [(bytes * 5, usize::MAX), (usize::MAX, 50)] {
+            let read = lines_of(endless().take(5), most_bytes, most_lines).await;
+            assert_eq!(read.expect("it fits").len(), 50);
+            let refused = lines_of(endless(), most_bytes, most_lines).await;
+            let error = refused.expect_err("it has no end");
+            assert_eq!(error.reason(), Some("RECORD_TOO_LARGE"));
+        }
     }
 }

@@ -22,8 +22,12 @@ const TLS_FAILED: &str = "TLS_FAILED";
 const CA_REFUSED: &str = "CA_REFUSED";
 /// Reason of a malformed secret; set by the client.
 const SECRET_REFUSED: &str = "SECRET_REFUSED";
+/// Reason of a participant's ticket in place of a seat's; set by the client.
+const TICKET_OF_PARTICIPANT: &str = "TICKET_OF_PARTICIPANT";
 /// Reason of a malformed token; set by the client.
 const TOKEN_REFUSED: &str = "TOKEN_REFUSED";
+/// Reason of a record that is larger than a record can be; set by the client.
+const RECORD_TOO_LARGE: &str = "RECORD_TOO_LARGE";
 /// Reason of a response without a required part; set by the client.
 const RESPONSE_INCOMPLETE: &str = "RESPONSE_INCOMPLETE";
 
@@ -47,8 +51,8 @@ impl Error {
 
     /// The reason in UPPER_SNAKE, for example `JOIN_CODE_WRONG`; `None` if there is none, as after
     /// a lost connection. The client itself sets `ADDRESS_REFUSED`, `CA_REFUSED`,
-    /// `CONNECT_FAILED`, `RESPONSE_INCOMPLETE`, `SECRET_REFUSED`, `STEP_GIVEN_UP`, `TLS_FAILED` and
-    /// `TOKEN_REFUSED`.
+    /// `CONNECT_FAILED`, `RECORD_TOO_LARGE`, `RESPONSE_INCOMPLETE`, `SECRET_REFUSED`, `STEP_GIVEN_UP`,
+    /// `TICKET_OF_PARTICIPANT`, `TLS_FAILED` and `TOKEN_REFUSED`.
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
@@ -115,6 +119,17 @@ impl Error {
     pub(crate) fn incomplete(part: &str) -> Self {
         let message = format!("the server's response lacks its {part}");
         Self::own(Code::Internal, RESPONSE_INCOMPLETE, message)
+    }
+
+    pub(crate) fn ticket_of_participant() -> Self {
+        let message = "this is the ticket of a tournament participant, not of a seat: use `Client::play_tournament`, or `chefshat tournament join`";
+        let code = Code::InvalidArgument;
+        Self::own(code, TICKET_OF_PARTICIPANT, message.to_owned())
+    }
+
+    pub(crate) fn record_too_large() -> Self {
+        let message = "the server sends more than a record can have".to_owned();
+        Self::own(Code::ResourceExhausted, RECORD_TOO_LARGE, message)
     }
 
     pub(crate) fn step_given_up() -> Self {

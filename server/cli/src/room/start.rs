@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use chefshat_client::v1::record_service_client::RecordServiceClient;
-use chefshat_client::v1::{self, create_room_request::Start, record_line::Line};
-use chefshat_client::{Client, Error};
+use chefshat_client::Client;
+use chefshat_client::v1::{self, create_room_request::Start};
 use clap::Args;
 
 use super::super::CommandError;
@@ -74,19 +73,8 @@ fn read_hands(file: &Path) -> Result<v1::ScriptedShift, CommandError> {
 /// # Errors
 /// `GAME_UNKNOWN`, `GAME_RUNNING`.
 pub(super) async fn players_of(client: &Client, game_id: &str) -> Result<usize, CommandError> {
-    let request = v1::GetRecordRequest {
-        game_id: game_id.to_owned(),
-    };
-    let mut service = RecordServiceClient::new(client.channel());
-    let mut parts = (service.get_record(request).await)
-        .map_err(Error::from)?
-        .into_inner();
-    let first = parts.message().await.map_err(Error::from)?;
-    let header = first.and_then(|part| part.lines.into_iter().next()?.line);
-    match header {
-        Some(Line::Header(header)) => Ok(header.seats.len()),
-        _ => Err("the record of that game has no header".into()),
-    }
+    let header = client.record_header(game_id).await?;
+    Ok(header.seats.len())
 }
 
 #[cfg(test)]
