@@ -370,3 +370,27 @@ fn unexpected_updates_do_not_stop_a_participant() {
     ]);
     assert!(sent.is_empty());
 }
+
+#[test]
+fn a_participants_ticket_is_not_a_seats() {
+    let mut harness = Harness::new(&[&[]]);
+    harness.session.attach();
+    let entered = v1::Entered {
+        request_id: FIRST_SEAT,
+        ..v1::Entered::default()
+    };
+    let game = v1::Attached {
+        game_id: "game".to_owned(),
+        ..v1::Attached::default()
+    };
+    let sent = harness.receive(vec![
+        (3, Update::Entered(entered)),
+        (4, Update::Attached(game)),
+        (3, detached(v1::DetachReason::Requested)),
+    ]);
+    assert_eq!(sent, ["3:detach"]);
+    assert!(harness.session.is_over());
+    let outcome = harness.session.into_outcomes().remove(0);
+    let error = outcome.expect_err("it has no seat");
+    assert_eq!(error.reason(), Some("TICKET_OF_PARTICIPANT"));
+}

@@ -69,8 +69,8 @@ pub(crate) struct Tickets {
     by_handle: BTreeMap<u32, u32>,
     /// Games whose results are known.
     played: BTreeSet<String>,
-    /// Handles of seats whose games have already been played, and whether they still have to be
-    /// detached. Their updates are ignored.
+    /// Handles of seats whose games have already been played, and of participants in place of seats,
+    /// and whether they still have to be detached. Their updates are ignored.
     ignored: BTreeMap<u32, bool>,
     progress: bool,
 }
@@ -175,7 +175,7 @@ impl Tickets {
         pack(commands.collect())
     }
 
-    /// The commands that detach seats whose games have already been played.
+    /// The commands that detach what is ignored.
     pub(crate) fn detach(&mut self) -> Vec<v1::SeatCommand> {
         let attached = self.ignored.iter_mut().filter(|(_, attached)| **attached);
         let detach = attached.map(|(&handle, attached)| {
@@ -206,7 +206,13 @@ impl Tickets {
                 Some((number, TicketEvent::Attached(attached)))
             }
             Update::Entered(entered) => {
-                self.tickets.get_mut(&PARTICIPANT)?.entered = true;
+                let Some(participant) = self.tickets.get_mut(&PARTICIPANT) else {
+                    // Nobody plays the games of a participant whose ticket was given as a seat's.
+                    self.ignored.insert(handle, true);
+                    let error = PlayError::Refused(Error::ticket_of_participant());
+                    return self.settle(entered.request_id, Err(error));
+                };
+                participant.entered = true;
                 self.assign(handle, PARTICIPANT);
                 Some((PARTICIPANT, TicketEvent::Entered(entered)))
             }

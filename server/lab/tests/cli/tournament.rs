@@ -250,6 +250,10 @@ fn an_organiser_changes_a_tournament_by_hand() {
 
     // Before the start, a place is free again.
     let cy = ticket_of(&url, code, "Cy");
+    // A place is not a seat, and its games do not wait for an agent that cannot play them.
+    let seat = run(&url, &format!("agent random --ticket {cy} --json"));
+    assert_eq!(seat.code, Some(1), "{seat:?}");
+    assert_eq!(seat.json()["reason"], "TICKET_OF_PARTICIPANT");
     let left = run(&url, &format!("tournament withdraw {id} --ticket {cy}"));
     assert_eq!(left.well().stdout, "participants  greedy 1, greedy 2\n");
     let [ada, _] = ["Ada", "Bo"].map(|name| ticket_of(&url, code, name));
