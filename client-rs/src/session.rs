@@ -21,6 +21,8 @@ pub(crate) struct Session<'a, A> {
     outcomes: BTreeMap<u32, Result<Outcome, PlayError>>,
     /// Only for a participant.
     make: Option<MakeAgent<'a, A>>,
+    /// The participant, once it has entered its tournament.
+    entered: Option<v1::Entered>,
     /// How its participation ended.
     end: Option<Result<(), PlayError>>,
     /// Seats that may have to send something, in order.
@@ -36,6 +38,7 @@ impl<'a, A: Agent> Session<'a, A> {
             seats: BTreeMap::new(),
             outcomes: BTreeMap::new(),
             make: None,
+            entered: None,
             end: None,
             asked: Vec::new(),
             progress: false,
@@ -122,6 +125,11 @@ impl<'a, A: Agent> Session<'a, A> {
         std::mem::take(&mut self.progress)
     }
 
+    /// The participant, if it has entered its tournament.
+    pub(crate) fn take_entered(&mut self) -> Option<v1::Entered> {
+        self.entered.take()
+    }
+
     /// The outcomes, in the order of the seats given.
     pub(crate) fn into_outcomes(self) -> Vec<Result<Outcome, PlayError>> {
         self.outcomes.into_values().collect()
@@ -137,7 +145,7 @@ impl<'a, A: Agent> Session<'a, A> {
 
     fn take_event(&mut self, number: u32, event: TicketEvent) {
         match event {
-            TicketEvent::Entered(_) => {}
+            TicketEvent::Entered(entered) => self.entered = Some(entered),
             TicketEvent::Attached(attached) => self.attached(number, attached),
             TicketEvent::Update(update) => {
                 let Some(seat) = self.seats.get_mut(&number) else {

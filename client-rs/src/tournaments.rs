@@ -259,9 +259,25 @@ impl Client {
         make: impl FnMut(&v1::Attached) -> A + Send,
         options: &PlayOptions,
     ) -> Result<Vec<Outcome>, PlayError> {
+        let (_, played) = self.take_part(ticket, make, options).await?;
+        Ok(played)
+    }
+
+    /// [`play_tournament_with`](Self::play_tournament_with) that also returns whose ticket it was:
+    /// `None` for that of a seat, whose game alone is played.
+    ///
+    /// # Errors
+    /// As [`play_tournament`](Self::play_tournament).
+    pub async fn take_part<A: Agent>(
+        &self,
+        ticket: impl Into<String>,
+        make: impl FnMut(&v1::Attached) -> A + Send,
+        options: &PlayOptions,
+    ) -> Result<(Option<v1::Entered>, Vec<Outcome>), PlayError> {
         let mut session = Session::of_participant(ticket.into(), make, options);
         run::run(self.channel(), &mut session, &options.backoff).await;
-        session.into_played()
+        let entered = session.take_entered();
+        Ok((entered, session.into_played()?))
     }
 }
 

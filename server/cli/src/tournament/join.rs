@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::kind::KindArg;
 use crate::name_key::NameKeyArg;
-use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
+use chefshat_client::{ActionId, Agent, Client, Outcome, PlayOptions, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
@@ -62,12 +62,6 @@ pub(super) struct Join {
     llm: LlmArgs,
 }
 
-/// A new place in a tournament.
-struct Place {
-    tournament_id: String,
-    participant: u32,
-}
-
 impl Join {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         if self.games > 1 && matches!(self.agent, PlayerArg::Llm) {
@@ -77,12 +71,9 @@ impl Join {
         let players = self.agent.players(&self.llm, self.seed, pace)?;
         players.check().await?;
         let client = self.server.connect_patiently().await?;
-        let (ticket, place) = match self.join_args.pass(None).await? {
-            Pass::Ticket(ticket) => (ticket, None),
-            Pass::Code(code) => {
-                let (ticket, place) = self.take_place(&client, code).await?;
-                (ticket, Some(place))
-            }
+        let ticket = match self.join_args.pass(None).await? {
+            Pass::Ticket(ticket) => ticket,
+            Pass::Code(code) => self.take_place(&client, code).await?,
         };
         let mut games = 0_u64;
         let all_played = Arc::new(AtomicBool::new(true));
@@ -97,10 +88,13 @@ impl Join {
         };
         // The tournament may be private.
         let client = client.with_secrets([&ticket])?;
-        let played = client.play_tournament(ticket, make).await;
-        let outcomes = played.map_err(|error| format!("the place was lost: {error}"))?;
-        let ended = match place {
+        let played = client
+            .take_part(ticket, make, &PlayOptions::default())
+            .await;
+        let (entered, outcomes) = played.map_err(|error| format!("the place was lost: {error}"))?;
+        let ended = match entered {
             Some(place) => self.tell_end(&client, &place).await?,
+            // The ticket was that of a seat.
             None => {
                 let games = counted(outcomes.len() as u64, "game");
                 anstream::eprintln!("the tournament is over; played here: {games}");
@@ -113,11 +107,8 @@ impl Join {
         })
     }
 
-    async fn take_place(
-        &self,
-        client: &Client,
-        code: String,
-    ) -> Result<(String, Place), CommandError> {
+    /// Joins, and returns the ticket.
+    async fn take_place(&self, client: &Client, code: String) -> Result<String, CommandError> {
         let name = self.name.clone();
         let name = name.unwrap_or_else(|| self.agent.display_name(&self.llm));
         let kind = self.kind_of.unwrap_or(self.agent.kind());
@@ -140,15 +131,15 @@ impl Join {
         anstream::eprintln!(
             "if this agent stops before the tournament ends, resume its place with --ticket {}",
             joined.ticket
-        );
-        let place = Place {
-            tournament_id: id,
-            participant,
-        };
-        Ok((joined.ticket, place))
+        ));
+        Ok(joined.ticket)
     }
 
-    async fn tell_end(&self, client: &Client, place: &Place) -> Result<ExitCode, CommandError> {
+    async fn tell_end(
+        &self,
+        client: &Client,
+        place: &v1::Entered,
+    ) -> Result<ExitCode, CommandError> {
         let results = client
             .tournament_results(place.tournament_id.as_str())
             .await?;

@@ -152,9 +152,9 @@ fn an_agent_that_ended_resumes_with_its_ticket() {
     let owner = text(&made["owner_token"]);
     let start = format!("tournament start {id} --owner-token {owner}");
     run(&url, &start).well();
-    let games = objects_of(second);
-    let [game] = games.as_slice() else {
-        panic!("expected one game: {games:?}");
+    let printed = objects_of(second);
+    let [game, over] = printed.as_slice() else {
+        panic!("expected one game and the end: {printed:?}");
     };
     assert_eq!(game["event"], "result");
 }
