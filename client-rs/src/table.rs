@@ -35,9 +35,24 @@ impl Client {
         rand::rngs::SysRng
             .try_fill_bytes(&mut id)
             .expect("the operating system gives random bytes");
+        let id = id.map(|byte| format!("{byte:02x}")).concat();
+        self.report_with_id(table_ticket, id, report).await
+    }
+
+    /// [`report`](Self::report) with an id of 1 to 64 characters, under which the same report can be
+    /// sent again after an error.
+    ///
+    /// # Errors
+    /// As [`report`](Self::report); `REPORT_ID_USED` if another report had the id.
+    pub async fn report_with_id(
+        &self,
+        table_ticket: impl Into<String>,
+        report_id: impl Into<String>,
+        report: v1::TableReport,
+    ) -> Result<v1::ReportResponse, Error> {
         let request = v1::ReportRequest {
             table_ticket: table_ticket.into(),
-            report_id: id.map(|byte| format!("{byte:02x}")).concat(),
+            report_id: report_id.into(),
             report: Some(report),
         };
         let service = service(self);

@@ -2,10 +2,16 @@
 
 use chefshat_client::v1::{self, table_report::Kind};
 use chefshat_client::{Backoff, Client, Error, TableFollower};
+use chefshat_room::ids::random_bytes;
 use clap::Args;
+use tokio::time::{Duration, Instant, sleep};
+use tonic::Code;
 
 use super::super::CommandError;
 use super::super::connect::{PATIENCE, ServerArg};
+
+/// Time between two attempts to report.
+const PAUSE: Duration = Duration::from_secs(1);
 
 /// The table.
 #[derive(Debug, Args)]
@@ -55,7 +61,8 @@ impl Table {
         })
     }
 
-    /// Reports what an attendant saw.
+    /// Reports what an attendant saw, again and again while the server is away, as the states are
+    /// followed.
     ///
     /// # Errors
     /// The server refuses the report, or does not answer.
@@ -65,6 +72,97 @@ impl Table {
             kind: Some(kind),
             ..v1::TableReport::default()
         };
-        self.client.report(&self.ticket, report).await
+        let id = hex::encode(random_bytes::<16>());
+        patiently(PATIENCE, PAUSE, || {
+            (self.client).report_with_id(self.ticket.as_str(), id.as_str(), report.clone())
+        })
+        .await
+    }
+}
+
+/// Repeats a report for some time, unless the server refuses it.
+async fn patiently<T, F>(
+    patience: Duration,
+    pause: Duration,
+    report: impl Fn() -> F,
+) -> Result<T, Error>
+where
+    F: Future<Output = Result<T, Error>>,
+{
+    let give_up_at = Instant::now() + patience;
+    loop {
+        match report().await {
+            Err(error)
+                if error.may_retry() && !is_passing(&error) && Instant::now() < give_up_at =>
+            {
+                sleep(pause).await;
+            }
+            result => return result,
+        }
+    }
+}
+
+/// Whether other reports can follow a refused one.
+pub(super) fn is_passing(error: &Error) -> bool {
+    let refused = [Code::FailedPrecondition, Code::InvalidArgument];
+    refused.contains(&error.code()) || error.reason() == Some("TOO_MANY_QUESTIONS")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use tonic::Status;
+    use tonic_types::{ErrorDetails, StatusExt as _};
+
+    use super::*;
+
+    fn error(code: Code, reason: &str) -> Error {
+        let details = ErrorDetails::with_error_info(reason, "chefshat", []);
+        Status::with_error_details(code, "no", details).into()
+    }
+
+    #[test]
+    fn only_what_is_wrong_with_the_table_ends_the_reports() {
+        use Code::{FailedPrecondition, InvalidArgument, ResourceExhausted, Unauthenticated};
+        for (code, reason, expected) in [
+            (InvalidArgument, "REPORT_REFUSED", true),
+            (FailedPrecondition, "GAME_NOT_STARTED", true),
+            (FailedPrecondition, "GAME_NOT_OVER", true),
+            (FailedPrecondition, "GAME_OVER", true),
+            (FailedPrecondition, "NOT_CORRECTABLE", true),
+            (FailedPrecondition, "NO_SUCH_OPTION", true),
+            (FailedPrecondition, "TOO_MANY_HELD_REPORTS", true),
+            (ResourceExhausted, "TOO_MANY_QUESTIONS", true),
+            (Unauthenticated, "TICKET_UNKNOWN", false),
+            (Code::Unavailable, "ROOM_GONE", false),
+        ] {
+            assert_eq!(is_passing(&error(code, reason)), expected, "{reason}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_report_waits_for_a_server_that_is_away_but_not_for_ever() {
+        let sent = Cell::new(0);
+        let answered = |patience, refusals: u32, code, reason| {
+            sent.set(0);
+            let sent = &sent;
+            patiently(patience, Duration::ZERO, move || {
+                sent.set(sent.get() + 1);
+                let answer = match sent.get() > refusals {
+                    true => Ok(sent.get()),
+                    false => Err(error(code, reason)),
+                };
+                std::future::ready(answer)
+            })
+        };
+        let (hour, gone) = (Duration::from_secs(3_600), Code::Unavailable);
+        let back = answered(hour, 8, gone, "ROOM_GONE").await;
+        assert_eq!(back.expect("it is back"), 9);
+        let too_long = answered(Duration::ZERO, 8, gone, "ROOM_GONE").await;
+        too_long.expect_err("given up");
+        let full = answered(hour, 8, Code::ResourceExhausted, "TOO_MANY_QUESTIONS").await;
+        full.expect_err("refused");
+        assert_eq!(sent.get(), 1);
     }
 }

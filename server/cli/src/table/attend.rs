@@ -1,30 +1,21 @@
 //! `chefshat table`: an attendant in a terminal, or a script. Shows every state of the table, and
 //! reports what is typed.
 
-use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::io::{self, BufRead, IsTerminal as _, Read as _, Write as _};
 use std::process::ExitCode;
-use std::thread;
+use std::{iter, thread};
 
+use chefshat_client::TableFollower;
 use chefshat_client::v1::{self, table_report::Kind};
-use chefshat_client::{Error, TableFollower};
 use tokio::sync::mpsc;
 
 use super::super::CommandError;
-use super::args::{Table, TableArgs};
+use super::args::{Table, TableArgs, is_passing};
 use super::display::Display;
 use super::line::{self, Command};
 
-/// Refusals of a report after which others can be made.
-const PASSING: [&str; 7] = [
-    "REPORT_REFUSED",
-    "GAME_NOT_STARTED",
-    "TOO_MANY_QUESTIONS",
-    "TOO_MANY_HELD_REPORTS",
-    "NO_SUCH_OPTION",
-    "NOT_CORRECTABLE",
-    // A remote seat ended the game meanwhile: the next state says so.
-    "GAME_OVER",
-];
+/// Maximum length of a line. What can be reported is far shorter.
+const MAX_LINE_BYTES: u64 = 4096;
 
 /// Attends to a table until the game or the input is over.
 pub(super) async fn attend(arguments: TableArgs) -> Result<ExitCode, CommandError> {
@@ -78,6 +69,13 @@ impl Attendant {
                 line = lines.recv(), if !waits => {
                     let Some(line) = line.transpose()? else { break };
                     prompted = false;
+                    let line = match line {
+                        Typed::Line(line) => line,
+                        Typed::Unreadable(line, problem) => {
+                            self.display.problem(&line, &problem)?;
+                            continue;
+                        }
+                    };
                     match line::parse(&line, &self.state) {
                         Ok(Command::Report(kind)) => self.report(&line, kind).await?,
                         Ok(Command::Help) => self.display.help()?,
@@ -115,10 +113,6 @@ impl Attendant {
     }
 }
 
-fn is_passing(error: &Error) -> bool {
-    (error.reason()).is_some_and(|reason| PASSING.contains(&reason))
-}
-
 /// Whether the table waits for a report, not for the decision of a remote seat.
 fn needs_a_report(state: &v1::TableState) -> bool {
     let at_table = |seat: u32| {
@@ -142,11 +136,52 @@ fn prompt() -> Result<(), CommandError> {
     Ok(out.flush()?)
 }
 
+/// What was typed.
+#[derive(Debug, PartialEq)]
+enum Typed {
+    Line(String),
+    /// The beginning of a line that cannot be a report, and why.
+    Unreadable(String, String),
+}
+
+/// The lines of an input, until it ends or fails.
+fn lines_of(mut input: impl BufRead) -> impl Iterator<Item = io::Result<Typed>> {
+    let mut number = 0;
+    iter::from_fn(move || {
+        number += 1;
+        next_line(&mut input, number).transpose()
+    })
+}
+
+fn next_line(input: &mut impl BufRead, number: u64) -> io::Result<Option<Typed>> {
+    let mut bytes = Vec::new();
+    let most = MAX_LINE_BYTES + 1;
+    input.by_ref().take(most).read_until(b'\n', &mut bytes)?;
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    let problem = if bytes.len() as u64 == most && !bytes.ends_with(b"\n") {
+        input.skip_until(b'\n')?;
+        bytes.truncate(80);
+        Some(format!(
+            "line {number} is longer than {MAX_LINE_BYTES} bytes"
+        ))
+    } else {
+        let is_text = std::str::from_utf8(&bytes).is_ok();
+        (!is_text).then(|| format!("line {number} is not UTF-8"))
+    };
+    let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();
+    Ok(Some(match problem {
+        None => Typed::Line(line),
+        Some(problem) => Typed::Unreadable(line, problem),
+    }))
+}
+
 /// The lines of the input. A thread reads them, which does not keep the process from ending.
-fn typed_lines() -> mpsc::Receiver<io::Result<String>> {
+fn typed_lines() -> mpsc::Receiver<io::Result<Typed>> {
     let (sender, receiver) = mpsc::channel(1);
     thread::spawn(move || {
-        for line in io::stdin().lock().lines() {
+        for line in lines_of(io::stdin().lock()) {
             if sender.blocking_send(line).is_err() {
                 return;
             }
@@ -158,6 +193,29 @@ fn typed_lines() -> mpsc::Receiver<io::Result<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_line_that_cannot_be_read_does_not_end_the_others() {
+        let long = "7 ".repeat(4_000);
+        let text = [
+            b"pass\r\nJos\xe9: 7\n" as &[u8],
+            long.as_bytes(),
+            b"\nclear",
+        ]
+        .concat();
+        let lines: Vec<Typed> = lines_of(&text[..]).map(|it| it.expect("bytes")).collect();
+        let typed = |line: &str| Typed::Line(line.to_owned());
+        assert_eq!(lines[0], typed("pass"));
+        let unreadable =
+            |line: &str, problem: &str| Typed::Unreadable(line.to_owned(), problem.to_owned());
+        assert_eq!(
+            lines[1],
+            unreadable("Jos\u{fffd}: 7", "line 2 is not UTF-8")
+        );
+        let problem = "line 3 is longer than 4096 bytes";
+        assert_eq!(lines[2], unreadable(long[..80].trim_end(), problem));
+        assert_eq!(lines[3..], [typed("clear")]);
+    }
 
     #[test]
     fn decisions_of_remote_seats_are_waited_for() {

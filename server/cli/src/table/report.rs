@@ -6,7 +6,7 @@ use chefshat_client::v1;
 use clap::Args;
 
 use super::super::CommandError;
-use super::args::TableArgs;
+use super::args::{TableArgs, is_passing};
 use super::display::Display;
 use super::line::{self, Command};
 
@@ -34,11 +34,28 @@ impl Report {
         let json = self.table.json;
         let table = self.table.connect().await?;
         let state = table.follow().next().await?.ok_or("the game is over")?;
-        let kind = match line::parse(&self.line, &state)? {
-            Command::Report(kind) => kind,
-            _ => return Err("say what happened, for example 'Ada: 7 7 joker'".into()),
+        // For scripts a line that is wrong differs from a server that is lost.
+        let problem = |problem: CommandError, message: &str| match json {
+            true => Display::new(json)
+                .problem(&self.line, message)
+                .map(|()| ExitCode::FAILURE),
+            false => Err(problem),
         };
-        let response = table.report(kind).await?;
+        let kind = match line::parse(&self.line, &state) {
+            Ok(Command::Report(kind)) => kind,
+            Ok(_) => {
+                let why = "say what happened, for example 'Ada: 7 7 joker'";
+                return problem(why.into(), why);
+            }
+            Err(why) => return problem(why.clone().into(), &why),
+        };
+        let response = match table.report(kind).await {
+            Err(error) if is_passing(&error) => {
+                let message = error.message().to_owned();
+                return problem(error.into(), &message);
+            }
+            response => response?,
+        };
         display.verdict(&self.line, &response)?;
         if json && let Some(state) = &response.state {
             display.state(state)?;
