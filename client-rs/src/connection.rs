@@ -2,6 +2,7 @@
 
 use std::error::Error as _;
 use std::fmt;
+use std::io::{self, Write as _};
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -159,7 +160,11 @@ pub(crate) async fn connect(url: &str, options: &ConnectOptions) -> Result<Conne
     {
         static WARNING: Once = Once::new();
         WARNING.call_once(|| {
-            eprintln!("WARNING: the token is sent unencrypted to {host}; use https://{host}");
+            // A program whose standard error nobody reads must not end by this.
+            let _ = writeln!(
+                io::stderr(),
+                "WARNING: the token is sent unencrypted to {host}; use https://{host}"
+            );
         });
     }
     let channel = endpoint

@@ -15,6 +15,7 @@ use chefshat_record::jsonl;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
+use super::error::tell;
 use super::llm::LlmArgs;
 use super::player::{Player, PlayerArg, player_arg};
 use super::remote::{MAX_PACE_MS, RemoteAgent};
@@ -186,12 +187,14 @@ impl AgentCommand {
             free => format!("waits for {free} other seats to be taken, then "),
         };
         let number = seat_number(joined.seat);
-        anstream::eprintln!("{name} has seat {number}; {waits}plays to the end");
+        tell(format_args!(
+            "{name} has seat {number}; {waits}plays to the end"
+        ));
         // The ticket grants the seat: it is shown only here, to the person who started the agent.
-        anstream::eprintln!(
+        tell(format_args!(
             "if this agent stops before the end of its game, resume its seat with --ticket {}",
             joined.ticket
-        );
+        ));
         Ok(joined.ticket)
     }
 }

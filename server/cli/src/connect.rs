@@ -10,6 +10,7 @@ use clap::Args;
 use tokio::time::{Instant, sleep};
 
 use super::CommandError;
+use super::error::tell;
 
 /// Time to wait for a server or a file.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -108,10 +109,10 @@ impl ServerArg {
                     }
                     if !std::mem::replace(&mut announced, true) {
                         let patience = PATIENCE.as_secs();
-                        anstream::eprintln!(
+                        tell(format_args!(
                             "no answer from {} yet; retrying for up to {patience} seconds",
                             self.server
-                        );
+                        ));
                     }
                 }
                 Err(error) => return Err(error.message().to_owned().into()),
@@ -258,10 +259,10 @@ async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError
             .into());
         }
         if !std::mem::replace(&mut announced, true) {
-            anstream::eprintln!(
+            tell(format_args!(
                 "waiting for {what} in {} for up to {patience} seconds",
                 file.display()
-            );
+            ));
         }
         sleep(PAUSE).await;
     }

@@ -13,6 +13,7 @@ use chefshat_server::clock::since_epoch_ms;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
+use super::error::tell;
 use super::numbers::{counted, duration};
 use super::output::table;
 use super::{CommandError, data_dir, say};
@@ -136,14 +137,14 @@ impl Create {
                 Some(folder) => format!(" --data-dir {}", folder.display()),
                 None => String::new(),
             };
-            eprintln!(
+            tell(format_args!(
                 "this is shown only once; revoke it with `chefshat token revoke {}{place}`",
                 created.id
-            );
+            ));
         }
         if is_first {
-            eprintln!(
-                "this is the first token here: a server that is running without tokens requires them once it is restarted"
+            tell(
+                "this is the first token here: a server that is running without tokens requires them once it is restarted",
             );
         }
         Ok(())

@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::connection::{get_study, refused, service};
 use crate::connect::{OwnerArgs, PATIENCE, ServerArg};
+use crate::error::tell;
 use crate::new_folder::{NewFolder, at};
 use crate::numbers::counted;
 use crate::{CommandError, say};
@@ -262,7 +263,9 @@ impl Follow {
             // The first one is the end of the stream, which a server that is back at once hides.
             if *failures == 2 {
                 let patience = PATIENCE.as_secs();
-                anstream::eprintln!("{error}; retrying for up to {patience} seconds");
+                tell(format_args!(
+                    "{error}; retrying for up to {patience} seconds"
+                ));
             }
             tokio::time::sleep(FOLLOW_AGAIN).await;
         }

@@ -13,6 +13,7 @@ use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
 use super::super::connect::{JoinArgs, Pass, ServerArg};
+use super::super::error::tell;
 use super::super::llm::LlmArgs;
 use super::super::numbers::counted;
 use super::super::player::{Player, PlayerArg, player_arg};
@@ -97,7 +98,7 @@ impl Join {
             // The ticket was that of a seat.
             None => {
                 let games = counted(outcomes.len() as u64, "game");
-                anstream::eprintln!("the tournament is over; played here: {games}");
+                tell(format_args!("the tournament is over; played here: {games}"));
                 ExitCode::SUCCESS
             }
         };
@@ -126,9 +127,11 @@ impl Join {
             .await?;
         let tournament = joined.tournament.unwrap_or_default();
         let (participant, id) = (joined.participant, tournament.tournament_id);
-        anstream::eprintln!("{name} takes part in tournament {id} as participant {participant}");
+        tell(format_args!(
+            "{name} takes part in tournament {id} as participant {participant}"
+        ));
         // The ticket grants the place: it is shown only here, to the person who started the agent.
-        anstream::eprintln!(
+        tell(format_args!(
             "if this agent stops before the tournament ends, resume its place with --ticket {}",
             joined.ticket
         ));
