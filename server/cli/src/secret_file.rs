@@ -1,5 +1,5 @@
-//! Writes a secret to a file for another program: the join code of a room or tournament, or its
-//! owner token.
+//! Writes a secret to a file for another program: the join code of a room or tournament, its owner
+//! token, or a ticket.
 
 use std::io;
 use std::path::Path;
@@ -42,21 +42,32 @@ impl<'a> SecretFile<'a> {
         }
     }
 
-    /// As [`Self::prepare`], for the owner token of what is to be created. A file that exists may be the
-    /// only copy of another one.
+    /// [`Self::new_only`] for the owner token of what is to be created.
     ///
     /// # Errors
     /// It exists, or cannot be written.
     pub(super) fn for_owner(path: &'a Path) -> Result<Self, CommandError> {
-        const FLAG: &str = "--owner-file";
+        Self::new_only(path, "--owner-file", "an owner token")
+    }
+
+    /// As [`Self::prepare`], for a secret that lasts. A file that exists may be the only copy of
+    /// another one.
+    ///
+    /// # Errors
+    /// It exists, or cannot be written.
+    pub(super) fn new_only(
+        path: &'a Path,
+        flag: &str,
+        what: &'static str,
+    ) -> Result<Self, CommandError> {
         if path.symlink_metadata().is_ok_and(|it| it.is_file()) {
             let path = path.display();
             return Err(format!(
-                "{FLAG}: {path} exists and may be the only copy of another owner token: choose another file; nothing was created"
+                "{flag}: {path} exists, and what it contains may be nowhere else: choose another file; nothing was created"
             )
             .into());
         }
-        Self::prepare(path, FLAG, "an owner token")
+        Self::prepare(path, flag, what)
     }
 
     /// Writes the secret.
@@ -80,6 +91,18 @@ impl<'a> SecretFile<'a> {
     }
 }
 
+/// Writes secrets to those files that there are. Call it before printing, which fails if nobody reads,
+/// and return its error after that.
+///
+/// # Errors
+/// A file cannot be written; the others are.
+pub(super) fn write_all<const N: usize>(
+    secrets: [(Option<SecretFile<'_>>, &str); N],
+) -> Result<(), CommandError> {
+    let written = secrets.map(|(file, secret)| file.map_or(Ok(()), |file| file.write(secret)));
+    written.into_iter().collect()
+}
+
 #[cfg(test)]
 mod tests {
     use crate::secret_file::*;
@@ -89,13 +112,18 @@ mod tests {
     }
 
     #[test]
-    fn an_owner_token_replaces_no_other() {
+    fn a_secret_that_lasts_replaces_no_other() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("owner");
         let prepared = SecretFile::for_owner(&file).expect("it can be written");
         prepared.write("first").expect("written");
-        let refused = SecretFile::for_owner(&file).err().expect("it exists");
-        assert!(refused.to_string().contains("choose another file"));
+        let refused = [
+            SecretFile::for_owner(&file),
+            SecretFile::new_only(&file, "--ticket-file", "a ticket"),
+        ];
+        for refused in refused.map(|it| it.err().expect("it exists").to_string()) {
+            assert!(refused.contains("choose another file"), "{refused}");
+        }
         assert_eq!(std::fs::read_to_string(&file).expect("read"), "first\n");
     }
 

@@ -14,7 +14,7 @@ use super::super::connect::{ServerArg, attendant_link};
 use super::super::policy_args::PolicyArgs;
 use super::super::remote::offered_agents;
 use super::super::rules_args::{RulesArgs, by_flag};
-use super::super::secret_file::SecretFile;
+use super::super::secret_file::{SecretFile, write_all};
 use super::super::{CommandError, say};
 use super::start::{StartArgs, players_of};
 
@@ -109,10 +109,7 @@ impl Create {
             .room
             .ok_or("the server did not return the created room")?;
         let (code, owner) = (created.join_code, created.owner_token);
-        let written = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
-            Some(file) => file.write(secret),
-            None => Ok(()),
-        });
+        let written = write_all([(code_file, &code), (owner_file, &owner)]);
         let table = self.physical.then(|| Table {
             link: attendant_link(self.server.url(), &room.room_id, &created.table_ticket),
             ticket: created.table_ticket,
@@ -145,7 +142,7 @@ impl Create {
             }
         }
         // Last, so that the secrets are printed even if this fails.
-        written.into_iter().collect::<Result<Vec<()>, _>>()?;
+        written?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -19,7 +19,7 @@ use serde_json::json;
 
 use self::connection::service;
 use super::connect::ServerArg;
-use super::secret_file::SecretFile;
+use super::secret_file::{SecretFile, write_all};
 use super::{CommandError, say};
 
 /// Run studies with people: conditions, participants, questionnaires, data.
@@ -119,15 +119,15 @@ impl Create {
         let created = created.await?;
         let study = created.study.ok_or("the server did not return the study")?;
         let owner = created.owner_token;
-        let written = owner_file.map(|file| file.write(&owner));
+        let written = write_all([(owner_file, &owner)]);
         if self.json {
             say(json!({"event": "created", "study": study, "owner_token": owner}))?;
         } else {
             // The token is nowhere else if its file could not be written.
-            let kept = (self.owner_file.as_ref()).filter(|_| matches!(written, Some(Ok(()))));
+            let kept = (self.owner_file.as_ref()).filter(|_| written.is_ok());
             self.print(&study, &owner, kept)?;
         }
-        written.unwrap_or(Ok(()))
+        written
     }
 
     /// Prints a study that was created, and its owner token unless a file has it.

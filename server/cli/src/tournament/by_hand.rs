@@ -8,7 +8,7 @@ use chefshat_client::{Client, v1};
 use clap::{ArgGroup, Args};
 
 use super::super::connect::{OwnerArgs, ServerArg};
-use super::super::secret_file::SecretFile;
+use super::super::secret_file::{SecretFile, write_all};
 use super::super::{CommandError, say};
 use super::list::game_in_a_line;
 use super::owner::Owned;
@@ -187,7 +187,7 @@ impl Replace {
         let client = self.owned.server.connect().await?.with_secrets([&token])?;
         let participant = number_of(&client, id, &self.participant).await?;
         let ticket_file = (self.ticket_file.as_deref())
-            .map(|file| SecretFile::prepare(file, "--ticket-file", "a ticket"))
+            .map(|file| SecretFile::new_only(file, "--ticket-file", "a ticket"))
             .transpose()?;
         let kind = self
             .kind
@@ -206,11 +206,14 @@ impl Replace {
         let replaced = client.replace_participant(request).await?;
         let ticket = Some(replaced.ticket).filter(|ticket| !ticket.is_empty());
         let tournament = replaced.tournament.unwrap_or_default();
-        let code = report("replaced", self.owned.json, &tournament, ticket.as_deref())?;
+        let ticket = ticket.as_deref();
+        let written = write_all([(
+            ticket_file.filter(|_| ticket.is_some()),
+            ticket.unwrap_or(""),
+        )]);
+        let code = report("replaced", self.owned.json, &tournament, ticket)?;
         // Last, so that the ticket is printed even if this fails.
-        if let (Some(file), Some(ticket)) = (ticket_file, ticket) {
-            file.write(&ticket)?;
-        }
+        written?;
         Ok(code)
     }
 }

@@ -12,7 +12,7 @@ use super::super::connect::ServerArg;
 use super::super::policy_args::PolicyArgs;
 use super::super::remote::named_agent;
 use super::super::rules_args::{RulesArgs, by_flag};
-use super::super::secret_file::SecretFile;
+use super::super::secret_file::{SecretFile, write_all};
 use super::super::{CommandError, say};
 use super::words::{DealsArg, FormatArg, time, time_in_words};
 
@@ -132,10 +132,7 @@ impl Create {
             .tournament
             .ok_or("the server did not return the created tournament")?;
         let (code, owner) = (created.join_code, created.owner_token);
-        let written = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
-            Some(file) => file.write(secret),
-            None => Ok(()),
-        });
+        let written = write_all([(code_file, &code), (owner_file, &owner)]);
         if self.json {
             let line = serde_json::json!({
                 "event": "created", "tournament": tournament, "join_code": code, "owner_token": owner,
@@ -148,7 +145,7 @@ impl Create {
             say(self.next_steps(&tournament, &code))?;
         }
         // Last, so that the secrets are printed even if this fails.
-        written.into_iter().collect::<Result<Vec<()>, _>>()?;
+        written?;
         Ok(ExitCode::SUCCESS)
     }
 

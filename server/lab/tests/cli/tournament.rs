@@ -9,7 +9,9 @@ use chefshat_client::{Client, v1};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Running, in_runtime, json_lines, run, serve, until};
+use super::run::{
+    Ended, Running, in_runtime, json_lines, program, run, serve, typed_into_a_closed_pipe, until,
+};
 
 /// Waits for the end of a program that must succeed. Returns its output, JSON lines.
 fn objects_of(program: Running) -> Vec<Value> {
@@ -286,7 +288,19 @@ fn an_organiser_changes_a_tournament_by_hand() {
     let replaced = command(&replace).well().json();
     let dee = std::fs::read_to_string(ticket_file).unwrap();
     assert_eq!(replaced["ticket"], dee.trim());
-    let withdrawn = command(&format!("withdraw {id} --participant Dee --json"));
+    // Its ticket is nowhere else if nobody reads what is printed.
+    let ticket_file = path(folder.path(), "eve");
+    let replace = format!("replace {id} Dee --name Eve --ticket-file {ticket_file}");
+    typed_into_a_closed_pipe(&format!(
+        "tournament {replace} --owner-file {owner} --server {url}"
+    ));
+    assert_ne!(std::fs::read_to_string(ticket_file).unwrap().trim(), "");
+    // What is typed counts more than a variable.
+    let withdraw = format!("tournament withdraw {id} --participant Eve --owner-file {owner}");
+    let mut by_owner = program();
+    by_owner.args(withdraw.split_whitespace());
+    by_owner.args(["--json", "--server", &url]);
+    let withdrawn = Ended::of(by_owner.env("CHEFSHAT_TICKET", ada).output().unwrap());
     assert_eq!(withdrawn.well().json()["event"], "withdrawn");
     assert_eq!(participant(&url, id, "Dee")["withdrawn"], true);
     let states = || -> Vec<Value> {
