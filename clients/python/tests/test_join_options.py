@@ -20,7 +20,7 @@ from waiting import LIMIT_S
 import chefshat
 from chefshat import ChefsHatError, RandomAgent, pb
 from chefshat import agent as command
-from chefshat.join_options import TICKET
+from chefshat.join_options import TICKET, name_key
 
 TESTS = Path(__file__).parent
 # Far longer than a test, so that a killed command resumes in time on a slow machine.
@@ -321,3 +321,18 @@ def test_a_name_keeps_its_key(real_address: str, tmp_path: Path, capsys: pytest.
         with pytest.raises(SystemExit, match="2"):
             command.main([*joining, way, "BCDF2345", "--name-key", str(key)])
         assert why in capsys.readouterr().err
+
+
+def test_commands_that_create_a_key_at_once_have_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, keys, link = tmp_path / "ada.key", [], os.link
+
+    def after_another(begun: Path, target: Path) -> None:
+        monkeypatch.setattr(os, "link", link)
+        keys.append(name_key(target))
+        link(begun, target)
+
+    monkeypatch.setattr(os, "link", after_another)
+    keys.append(name_key(file))
+    assert len(keys) == 2
+    assert len(set(keys)) == 1
+    assert list(tmp_path.iterdir()) == [file]

@@ -37,13 +37,37 @@ pub fn read_or_create(file: &Path) -> Result<[u8; 32], String> {
         return Ok(key);
     }
     let key = rand::random::<[u8; 32]>();
-    let written = create(file, &key);
-    written.map_err(|error| format!("{}: {}", file.display(), error.source))?;
-    Ok(key)
+    match create(file, &key) {
+        Ok(()) => Ok(key),
+        Err(error) => match read(file) {
+            // Another process was first.
+            Ok(Some(key)) => Ok(key),
+            _ => Err(format!("{}: {}", file.display(), error.source)),
+        },
+    }
 }
 
 fn create(path: &Path, key: &[u8; 32]) -> Result<(), WriteError> {
     let mut file = AtomicFile::create_private(path)?;
     file.write_all(format!("{}\n", hex::encode(key)).as_bytes())?;
     file.finish_new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_who_create_a_key_at_once_have_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for round in 0..20 {
+            let file = folder.path().join(round.to_string());
+            let keys: Vec<_> = std::thread::scope(|scope| {
+                let threads = [(); 8].map(|()| scope.spawn(|| read_or_create(&file)));
+                threads.map(|it| it.join().expect("no panic")).to_vec()
+            });
+            let first = keys[0].clone().expect("a key");
+            assert!(keys.iter().all(|key| *key == Ok(first)), "{keys:?}");
+        }
+    }
 }

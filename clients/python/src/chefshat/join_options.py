@@ -10,7 +10,7 @@ import re
 import secrets
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -162,14 +162,25 @@ def name_key(file: Path | None) -> bytes:
     try:
         text = file.read_text(encoding="ascii").strip()
     except FileNotFoundError:
-        text = secrets.token_hex(NAME_KEY_BYTES)
-        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with open(descriptor, "w", encoding="ascii") as created:
-            created.write(f"{text}\n")
+        _create_key(file)
+        text = file.read_text(encoding="ascii").strip()
     if not re.fullmatch(rf"[0-9a-fA-F]{{{2 * NAME_KEY_BYTES}}}", text):
         digits = 2 * NAME_KEY_BYTES
         raise ValueError(f"{file} contains no key: {digits} hexadecimal digits; name a file that does not exist to create one")
     return bytes.fromhex(text)
+
+
+def _create_key(file: Path) -> None:
+    """Creates the file of a new key, complete when it appears, unless another process does so at the same time."""
+    begun = file.with_name(f".{file.name}.{secrets.token_hex(8)}")
+    descriptor = os.open(begun, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        with open(descriptor, "w", encoding="ascii") as created:
+            created.write(f"{secrets.token_hex(NAME_KEY_BYTES)}\n")
+        with suppress(FileExistsError):
+            os.link(begun, file)
+    finally:
+        begun.unlink()
 
 
 def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_name: bool = True) -> list[JoinOptions]:
