@@ -14,6 +14,8 @@ use super::error::tell;
 
 /// Time to wait for a server or a file.
 pub const PATIENCE: Duration = Duration::from_secs(30);
+/// The variable with a ticket.
+const TICKET: &str = "CHEFSHAT_TICKET";
 /// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -55,10 +57,35 @@ impl ServerArg {
         &self.server
     }
 
+    /// The address of the server's page, which links begin with. Without a scheme, a browser would
+    /// take the host for one.
+    pub fn page(&self) -> String {
+        let url = self.server.trim_end_matches('/');
+        match url.contains("://") {
+            true => url.to_owned(),
+            false => format!("http://{url}"),
+        }
+    }
+
+    /// A command for this server with a ticket, in a variable: flags show in lists of processes.
+    pub fn with_ticket(&self, command: &str, ticket: &str) -> String {
+        let ca = self.authorities();
+        let ca = ca.map_or_else(String::new, |ca| format!(" --ca {}", ca.display()));
+        let there = format!("--server {}{ca}", self.server);
+        match cfg!(windows) {
+            true => format!("chefshat {command} {there} --ticket {ticket}"),
+            false => format!("{TICKET}={ticket} chefshat {command} {there}"),
+        }
+    }
+
+    fn authorities(&self) -> Option<&Path> {
+        self.ca.as_deref().filter(|ca| !ca.as_os_str().is_empty())
+    }
+
     async fn attempt(&self) -> Result<Client, chefshat_client::Error> {
         let options = ConnectOptions {
             token: self.token.clone().filter(|token| !token.is_empty()),
-            ca: self.ca.clone(),
+            ca: self.authorities().map(Path::to_path_buf),
         };
         Client::connect_with(&self.server, &options).await
     }
@@ -82,9 +109,7 @@ impl ServerArg {
     /// # Errors
     /// As [`connect`](Self::connect); a file is unreadable.
     pub async fn connect_with(&self, secrets: &SecretArgs) -> Result<Client, CommandError> {
-        let shown: Vec<_> = (secrets.tickets.iter().cloned())
-            .chain(secrets.owner.given()?)
-            .collect();
+        let shown = secrets.given()?;
         Ok(self.connect().await?.with_secrets(shown)?)
     }
 
@@ -125,8 +150,9 @@ impl ServerArg {
 /// The proof of who created a room or tournament.
 #[derive(Clone, Default, Args)]
 pub struct OwnerArgs {
-    /// The owner token, printed by `create`.
-    #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
+    /// The owner token, printed by `create`. CHEFSHAT_OWNER_TOKEN does the same and does not show in
+    /// lists of processes.
+    #[arg(long)]
     owner_token: Option<String>,
     /// File with the owner token, written by `create --owner-file`.
     #[arg(long, value_name = "FILE")]
@@ -134,23 +160,39 @@ pub struct OwnerArgs {
 }
 
 impl OwnerArgs {
-    /// The owner token, if there is one; the file has priority over the environment.
+    /// The owner token that a flag gives, if one does.
     ///
     /// # Errors
-    /// The file is unreadable.
-    pub(crate) fn given(&self) -> Result<Option<String>, CommandError> {
-        match &self.owner_file {
-            Some(file) => std::fs::read_to_string(file)
-                .map(|text| Some(text.trim().to_owned()))
-                .map_err(|error| format!("--owner-file: {}: {error}", file.display()).into()),
-            None => Ok(self.owner_token.clone()),
+    /// The file is unreadable or empty.
+    pub(crate) fn by_flag(&self) -> Result<Option<String>, CommandError> {
+        if let Some(token) = self.owner_token.as_ref().filter(|it| !it.is_empty()) {
+            return Ok(Some(token.clone()));
         }
+        let Some(file) = &self.owner_file else {
+            return Ok(None);
+        };
+        let name = file.display();
+        let text = std::fs::read_to_string(file);
+        let text = text.map_err(|error| format!("--owner-file: {name}: {error}"))?;
+        match text.trim() {
+            "" => Err(format!("--owner-file: {name} is empty").into()),
+            token => Ok(Some(token.to_owned())),
+        }
+    }
+
+    /// The owner token, if there is one: of a flag, or else of the environment.
+    ///
+    /// # Errors
+    /// The file is unreadable or empty.
+    pub(crate) fn given(&self) -> Result<Option<String>, CommandError> {
+        let by_flag = self.by_flag()?;
+        Ok(by_flag.or_else(|| in_environment("CHEFSHAT_OWNER_TOKEN")))
     }
 
     /// The owner token.
     ///
     /// # Errors
-    /// There is none, or the file is unreadable.
+    /// There is none, or the file is unreadable or empty.
     pub fn token(&self) -> Result<String, CommandError> {
         let token = self.given()?;
         token.ok_or_else(|| "give --owner-token or --owner-file".into())
@@ -180,6 +222,14 @@ pub struct SecretArgs {
     owner: OwnerArgs,
 }
 
+impl SecretArgs {
+    /// The secrets that are not empty.
+    fn given(&self) -> Result<Vec<String>, CommandError> {
+        let tickets = self.tickets.iter().filter(|ticket| !ticket.is_empty());
+        Ok(tickets.cloned().chain(self.owner.given()?).collect())
+    }
+}
+
 /// Leaves out the secrets.
 impl fmt::Debug for SecretArgs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -189,7 +239,7 @@ impl fmt::Debug for SecretArgs {
 
 /// How to get a seat or place.
 #[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
+#[group(required = ticket_in_environment().is_none(), multiple = false)]
 pub struct JoinArgs {
     /// Join code.
     #[arg(long)]
@@ -197,8 +247,9 @@ pub struct JoinArgs {
     /// File with the join code; waits until it exists.
     #[arg(long, value_name = "FILE")]
     code_file: Option<PathBuf>,
-    /// Ticket of a seat or place to resume.
-    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
+    /// Ticket to resume with: of a seat or, in `tournament join`, of a place. CHEFSHAT_TICKET does the
+    /// same, unless another flag says what to join, and does not show in lists of processes.
+    #[arg(long)]
     ticket: Option<String>,
 }
 
@@ -225,9 +276,22 @@ impl JoinArgs {
             (Some(ticket), ..) => Ok(Pass::Ticket(ticket.clone())),
             (None, Some(code), _) => Ok(Pass::Code(code.clone())),
             (None, None, Some(file)) => Ok(Pass::Code(code_in(file, last).await?)),
-            (None, None, None) => Err("give --code, --code-file or --ticket".into()),
+            (None, None, None) => ticket_in_environment()
+                .map(Pass::Ticket)
+                .ok_or_else(|| "give --code, --code-file or --ticket".into()),
         }
     }
+}
+
+/// The ticket in the environment. Read here and not by clap, for which a variable counts as much as a
+/// flag: it would conflict with a code that somebody typed.
+pub(crate) fn ticket_in_environment() -> Option<String> {
+    in_environment(TICKET)
+}
+
+/// A variable of the environment, unless it is empty.
+pub(crate) fn in_environment(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
 /// Waits up to [`PATIENCE`] for a join code other than `last` in a file.
@@ -275,7 +339,60 @@ pub fn free_seats(room: &v1::Room) -> usize {
 }
 
 /// The address of the attendant's view. Browsers send what follows the # to no server.
-pub fn attendant_link(server: &str, room_id: &str, ticket: &str) -> String {
-    let server = server.trim_end_matches('/');
-    format!("{server}/rooms/{room_id}/table#ticket={ticket}")
+pub fn attendant_link(page: &str, room_id: &str, ticket: &str) -> String {
+    format!("{page}/rooms/{room_id}/table#ticket={ticket}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_have_a_scheme_and_one_slash() {
+        let page = |url: &str| ServerArg::new(url.to_owned(), None, None).page();
+        assert_eq!(page("localhost:7"), "http://localhost:7");
+        assert_eq!(page("https://chef.example/"), "https://chef.example");
+        assert_eq!(page("http://[::1]:7"), "http://[::1]:7");
+    }
+
+    #[test]
+    fn what_is_empty_is_not_given() {
+        let server = ServerArg::new("h:1".to_owned(), None, Some(PathBuf::new()));
+        assert_eq!(server.authorities(), None);
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("owner");
+        let by_flag = |token: &str, file: Option<&Path>| {
+            let owner = OwnerArgs {
+                owner_token: Some(token.to_owned()),
+                owner_file: file.map(Path::to_path_buf),
+            };
+            owner.by_flag()
+        };
+        assert_eq!(by_flag("", None).expect("nothing is given"), None);
+        std::fs::write(&file, "").expect("written");
+        let error = by_flag("", Some(&file)).expect_err("it has no token");
+        assert!(error.to_string().ends_with("owner is empty"), "{error}");
+        std::fs::write(&file, "of the file\n").expect("written");
+        let of_file = by_flag("", Some(&file)).expect("it can be read");
+        assert_eq!(of_file.as_deref(), Some("of the file"));
+        let typed = by_flag("typed", Some(&file)).expect("it is given");
+        assert_eq!(typed.as_deref(), Some("typed"));
+        let secrets = SecretArgs {
+            tickets: vec![String::new(), "T".to_owned()],
+            owner: OwnerArgs::default(),
+        };
+        assert_eq!(secrets.given().expect("one"), ["T"]);
+    }
+
+    #[test]
+    fn a_ticket_stays_out_of_lists_of_processes() {
+        let server = ServerArg::new("h:1".to_owned(), None, Some(PathBuf::from("ca.pem")));
+        let command = server.with_ticket("play", "T");
+        if cfg!(unix) {
+            assert_eq!(
+                command,
+                "CHEFSHAT_TICKET=T chefshat play --server h:1 --ca ca.pem"
+            );
+        }
+    }
 }

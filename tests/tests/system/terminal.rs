@@ -174,7 +174,7 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     terminal.wait_for("Leave the tournament?").await;
     terminal.press("y");
     let said = terminal.ended(1).await;
-    let (_, ticket) = said.split_once("--ticket ").expect("the option to resume");
+    let (_, ticket) = said.rsplit_once("CHEFSHAT_TICKET=").expect("how to resume");
     let ticket = ticket.split_whitespace().next().expect("a ticket");
 
     let back = ["play", "--server", &url, "--ticket", ticket];

@@ -111,7 +111,7 @@ impl Create {
         let (code, owner) = (created.join_code, created.owner_token);
         let written = write_all([(code_file, &code), (owner_file, &owner)]);
         let table = self.physical.then(|| Table {
-            link: attendant_link(self.server.url(), &room.room_id, &created.table_ticket),
+            link: attendant_link(&self.server.page(), &room.room_id, &created.table_ticket),
             ticket: created.table_ticket,
         });
         if self.json {
@@ -459,7 +459,7 @@ mod tests {
     #[test]
     fn the_attendants_link_opens_the_page() {
         assert_eq!(
-            attendant_link("http://[::1]:7/", "5f", "ab"),
+            attendant_link("http://[::1]:7", "5f", "ab"),
             "http://[::1]:7/rooms/5f/table#ticket=ab"
         );
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use chefshat_client::{Client, v1};
 use clap::{ArgGroup, Args};
 
-use super::super::connect::{OwnerArgs, ServerArg};
+use super::super::connect::{OwnerArgs, ServerArg, ticket_in_environment};
 use super::super::secret_file::{SecretFile, write_all};
 use super::super::{CommandError, say};
 use super::list::game_in_a_line;
@@ -112,8 +112,8 @@ struct Asker {
     /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
-    /// The participant's ticket.
-    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
+    /// The participant's ticket. CHEFSHAT_TICKET does the same, unless a flag gives the owner token.
+    #[arg(long)]
     ticket: Option<String>,
     #[command(flatten)]
     owner: OwnerArgs,
@@ -134,9 +134,17 @@ impl std::fmt::Debug for Asker {
 impl Asker {
     /// The ticket and the owner token; one of them is empty.
     fn secrets(&self) -> Result<(String, String), CommandError> {
-        match &self.ticket {
-            Some(ticket) => Ok((ticket.clone(), String::new())),
-            None => Ok((String::new(), self.owner.token().map_err(|_| NO_SECRET)?)),
+        let of_owner = |token| (String::new(), token);
+        let of_participant = |ticket| (ticket, String::new());
+        if let Some(ticket) = self.ticket.clone().filter(|ticket| !ticket.is_empty()) {
+            return Ok(of_participant(ticket));
+        }
+        if let Some(token) = self.owner.by_flag()? {
+            return Ok(of_owner(token));
+        }
+        match ticket_in_environment() {
+            Some(ticket) => Ok(of_participant(ticket)),
+            None => Ok(of_owner(self.owner.token().map_err(|_| NO_SECRET)?)),
         }
     }
 }

@@ -93,7 +93,7 @@ impl Table {
             .physical_table(self.owned.tournament_id.as_str(), token, self.game)
             .await?;
         let (room, ticket, owner) = (table.room_id, table.table_ticket, table.owner_token);
-        let link = attendant_link(self.owned.server.url(), &room, &ticket);
+        let link = attendant_link(&self.owned.server.page(), &room, &ticket);
         if self.owned.json {
             say(serde_json::json!({
                 "event": "table", "game": self.game, "room_id": room, "table_ticket": ticket,

@@ -1,7 +1,7 @@
 //! Commands that connect: TLS with a private authority, tokens, and what is said when they are
 //! missing.
 
-use super::run::{chefshat, fixture, run, serve_with, typed};
+use super::run::{Ended, chefshat, fixture, program, run, serve_with, typed};
 
 #[test]
 fn commands_connect_with_tls_and_a_token() {
@@ -43,4 +43,34 @@ fn a_token_that_others_can_read_on_the_way_is_warned_of() {
         let said = list(safe);
         assert!(!said.contains("unencrypted"), "{said}");
     }
+}
+
+#[test]
+fn what_is_typed_counts_more_than_a_variable() {
+    // This address is refused at once; before that, a variable would conflict with a flag.
+    let refused = "is not the address of a server";
+    let terminal = "needs an interactive terminal";
+    for (line, expected) in [
+        ("agent greedy --code C --server x://y", refused),
+        ("agent greedy --server x://y", refused),
+        (
+            "tournament join --agent greedy --code C --server x://y",
+            refused,
+        ),
+        ("play --code C", terminal),
+        ("play --local", terminal),
+        ("play --ticket T", terminal),
+    ] {
+        let mut command = program();
+        command.args(line.split_whitespace());
+        command
+            .env("CHEFSHAT_TICKET", "T")
+            .env("CHEFSHAT_NAME", "Ada");
+        Ended::of(command.output().unwrap()).assert_refused(expected);
+    }
+    let mut without = program();
+    without.args(["agent", "greedy"]).env("CHEFSHAT_TICKET", "");
+    let ended = Ended::of(without.output().unwrap());
+    ended.assert_refused("--code");
+    assert_eq!(ended.code, Some(2), "{ended:?}");
 }

@@ -159,6 +159,8 @@ fn an_agent_that_ended_resumes_with_its_ticket() {
         panic!("expected one game and the end: {printed:?}");
     };
     assert_eq!(game["event"], "result");
+    assert_eq!(over["event"], "over");
+    assert_eq!(over["state"], "finished");
 }
 
 #[test]
@@ -302,7 +304,7 @@ fn an_organiser_changes_a_tournament_by_hand() {
     by_owner.args(["--json", "--server", &url]);
     let withdrawn = Ended::of(by_owner.env("CHEFSHAT_TICKET", ada).output().unwrap());
     assert_eq!(withdrawn.well().json()["event"], "withdrawn");
-    assert_eq!(participant(&url, id, "Dee")["withdrawn"], true);
+    assert_eq!(participant(&url, id, "Eve")["withdrawn"], true);
     let states = || -> Vec<Value> {
         let games = games(&url, id);
         games.iter().map(|game| game["state"].clone()).collect()

@@ -35,8 +35,9 @@ use chefshat_record::jsonl;
 use clap::Args;
 
 use crate::CommandError;
-use crate::connect::ServerArg;
+use crate::connect::{ServerArg, in_environment, ticket_in_environment};
 use crate::data_dir;
+use crate::error::tell;
 use crate::name_key::NameKeyArg;
 use crate::remote::named_agent;
 use crate::rules_args::{RulesArgs, rules_of};
@@ -55,24 +56,19 @@ const MAX_PACE_MS: i64 = 60_000;
                   chefshat play --local --agents trained,trained,trained --target-shifts 3\n\n\
                   The code of a tournament works, too: your games start by themselves, with the standings between them, until the \
                   tournament is over.\n\n\
-                  Press ? for the keys. If you leave or the connection is lost, a ticket is printed; resume with --ticket.\n\n\
+                  Press ? for the keys. A ticket is printed before the game: with it you resume if you leave, or the connection or the terminal is lost.\n\n\
                   Exit code: 0 when the game or tournament finished, 1 when it was aborted, closed, left or lost, 2 without a terminal.")]
 pub(crate) struct Play {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
     seat: SeatArgs,
-    /// Display name.
-    #[arg(
-        long,
-        env = "CHEFSHAT_NAME",
-        default_value = "Guest",
-        conflicts_with = "ticket"
-    )]
-    name: String,
+    /// Display name. Default: that of CHEFSHAT_NAME, or else Guest.
+    #[arg(long, conflicts_with = "ticket")]
+    name: Option<String>,
     #[command(flatten)]
     name_key: NameKeyArg,
-    /// With --local: the built-in agents, in turn: random, greedy, trained.
+    /// With --local: the built-in agents, in turn: random, greedy, trained, monte_carlo.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent,
           default_values = ["trained", "greedy", "random"])]
     agents: Vec<NamedAgent>,
@@ -93,13 +89,14 @@ pub(crate) struct Play {
 
 /// How to get a seat.
 #[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
+#[group(required = ticket_in_environment().is_none(), multiple = false)]
 struct SeatArgs {
     /// Join code of a room or tournament.
     #[arg(long)]
     code: Option<String>,
-    /// Ticket of a seat or place to resume.
-    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
+    /// Ticket of a seat or place to resume. CHEFSHAT_TICKET does the same, unless another flag says what
+    /// to play, and does not show in lists of processes.
+    #[arg(long)]
     ticket: Option<String>,
     /// Run a server in this process and play against built-in agents.
     #[arg(long)]
@@ -125,13 +122,13 @@ impl Play {
         else {
             let taken = self.take().await?;
             let server = self.server.url().to_owned();
+            let back = self.server.with_ticket("play", &taken.ticket);
+            // It stays above the screen, whatever ends that.
+            tell(format_args!("to resume: {back}"));
             let hints = Hints {
-                back: Some(format!(
-                    "chefshat play --server {server} --ticket {}",
-                    taken.ticket
-                )),
+                back: Some(back),
                 results: format!("chefshat tournament results --server {server}"),
-                page: server.starts_with("http").then(|| server.clone()),
+                page: Some(self.server.page()),
                 record: Box::new(move |game| {
                     format!("chefshat records get {game} --server {server}")
                 }),
@@ -159,17 +156,23 @@ impl Play {
 
     async fn take(&self) -> Result<Taken, CommandError> {
         let client = self.server.connect().await?;
-        match (&self.seat.ticket, &self.seat.code) {
-            (Some(ticket), _) => Ok(Taken {
-                client,
-                ticket: ticket.clone(),
-                game: None,
-            }),
-            (None, code) => {
-                let code = code.as_deref().unwrap_or("");
-                join::by_code(client, code, &self.name, self.name_key.key()?).await
-            }
+        if let Some(code) = &self.seat.code {
+            return join::by_code(client, code, &self.name(), self.name_key.key()?).await;
         }
+        let ticket = self.seat.ticket.clone().or_else(ticket_in_environment);
+        Ok(Taken {
+            client,
+            ticket: ticket.ok_or("give --code or --ticket")?,
+            game: None,
+        })
+    }
+
+    fn name(&self) -> String {
+        let name = self
+            .name
+            .clone()
+            .or_else(|| in_environment("CHEFSHAT_NAME"));
+        name.unwrap_or_else(|| "Guest".to_owned())
     }
 
     /// A seat in a new room with built-in agents.
@@ -187,6 +190,6 @@ impl Play {
         });
         let room = join::own_room(rules, seats.collect(), self.pace_ms);
         let made = client.create_room(room).await?;
-        join::by_code(client, &made.join_code, &self.name, self.name_key.key()?).await
+        join::by_code(client, &made.join_code, &self.name(), self.name_key.key()?).await
     }
 }
