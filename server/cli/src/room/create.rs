@@ -97,6 +97,9 @@ impl Create {
             (None, _) => 0,
         };
         let request = self.request(start, players)?;
+        let is_wizard =
+            |seat: &&v1::SeatConfig| matches!(seat.filled_by, Some(FilledBy::Wizard(_)));
+        let wizards = request.seats.iter().filter(is_wizard).count();
         // Before the room is created: without a file for its code it would be useless.
         let code_file = (self.code_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
@@ -137,7 +140,7 @@ impl Create {
                     table.ticket
                 ))?;
             }
-            for words in next_steps(&room, self.server.url(), &code) {
+            for words in next_steps(&room, wizards, &self.server, &code) {
                 say(words)?;
             }
         }
@@ -282,7 +285,7 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
         Err(AgentNameError::Unknown(_)) => {
             let offered = offered_agents();
             Err(format!(
-                "use one of {offered}, replay:GAME-ID:SEAT, open, agent, human, robot, model, wizard"
+                "use one of {offered}, replay:GAME-ID:SEAT, open, agent, human, robot, model, wizard or, with --physical, table=NAME, table_robot=NAME"
             ))
         }
         Err(error) => Err(error.to_string()),
@@ -322,8 +325,9 @@ fn refused(error: chefshat_client::Error) -> CommandError {
     }
 }
 
-/// How to fill the free seats: a line for each kind of participant that they are for.
-fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
+/// How to fill the free seats: a line for each kind of participant that they are for. The room shows
+/// those of wizards as robots'; a program there would be recorded as a person.
+fn next_steps(room: &v1::Room, wizards: usize, server: &ServerArg, code: &str) -> Vec<String> {
     let kinds = [
         v1::ParticipantKind::Unspecified,
         v1::ParticipantKind::Agent,
@@ -333,9 +337,14 @@ fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
     ];
     let free = |kind: v1::ParticipantKind| {
         let free = room.seats.iter().filter(|seat| seat.name.is_empty());
-        free.filter(|seat| seat.reserved_for() == kind).count()
+        let free = free.filter(|seat| seat.reserved_for() == kind).count();
+        match kind {
+            v1::ParticipantKind::Robot => free.saturating_sub(wizards),
+            _ => free,
+        }
     };
-    let there = format!("--server {server} --code {code}");
+    let there = format!("--server {} --code {code}", server.url());
+    let page = format!("{}/join/{code}", server.page());
     let steps = kinds.into_iter().filter_map(|kind| {
         let (whom, command) = match kind {
             v1::ParticipantKind::Unspecified => ("", format!("chefshat agent greedy {there}")),
@@ -349,7 +358,6 @@ fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
                 (" for language models", command)
             }
             v1::ParticipantKind::Human => {
-                let page = format!("{server}/join/{code}");
                 let command = format!("chefshat play {there}, or in a browser at {page}");
                 (" for people", command)
             }
@@ -362,7 +370,12 @@ fn next_steps(room: &v1::Room, server: &str, code: &str) -> Vec<String> {
             )),
         }
     });
-    steps.collect()
+    let page = format!("{page}?as=robot");
+    let as_robot = (wizards > 0).then(|| match wizards {
+        1 => format!("1 seat is for a person who plays as a robot; join it at {page}"),
+        seats => format!("{seats} seats are for people who play as robots; join each at {page}"),
+    });
+    steps.chain(as_robot).collect()
 }
 
 #[cfg(test)]
@@ -490,25 +503,26 @@ mod tests {
             reserved_for: kind.into(),
             ..v1::Participant::default()
         };
-        let words = |seats: Vec<v1::Participant>| {
+        let words = |wizards, seats: Vec<v1::Participant>| {
             let room = v1::Room {
                 seats,
                 ..v1::Room::default()
             };
-            next_steps(&room, "http://[::1]:7", "BCDF2345")
+            let server = ServerArg::new("http://[::1]:7/".to_owned(), None, None);
+            next_steps(&room, wizards, &server, "BCDF2345")
         };
         let any = v1::ParticipantKind::Unspecified;
         let (human, robot) = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
-        assert!(words(vec![seat("Ada", any)]).is_empty());
-        let there = "--server http://[::1]:7 --code BCDF2345";
+        assert!(words(0, vec![seat("Ada", any)]).is_empty());
+        let there = "--server http://[::1]:7/ --code BCDF2345";
         let page = "http://[::1]:7/join/BCDF2345";
         let people = format!("chefshat play {there}, or in a browser at {page}");
         assert_eq!(
-            words(vec![seat("Ada", any), seat("", human)]),
+            words(0, vec![seat("Ada", any), seat("", human)]),
             [format!("1 seat is free for people; fill it with: {people}")]
         );
         assert_eq!(
-            words(vec![seat("", any), seat("", any)]),
+            words(0, vec![seat("", any), seat("", any)]),
             [format!(
                 "2 seats are free; fill each with: chefshat agent greedy {there}"
             )]
@@ -516,13 +530,19 @@ mod tests {
         // Each command is for seats that admit its kind.
         let all = [robot, human, human, human].map(|kind| seat("", kind));
         assert_eq!(
-            words(all.to_vec()),
+            words(0, all.to_vec()),
             [
                 format!(
                     "1 seat is free for robots; fill it with: chefshat agent greedy {there} --kind-of robot"
                 ),
                 format!("3 seats are free for people; fill each with: {people}"),
             ]
+        );
+        let as_robot =
+            format!("1 seat is for a person who plays as a robot; join it at {page}?as=robot");
+        assert_eq!(
+            words(1, vec![seat("Ada", any), seat("", robot)]),
+            [as_robot]
         );
     }
 

@@ -142,7 +142,7 @@ impl Create {
             Some(file) => say(format_args!("owner token  in {}", file.display()))?,
             None => say(format_args!("owner token  {owner}"))?,
         }
-        if let Some(address) = owner::open_address(self.server.url(), study) {
+        if let Some(address) = owner::open_address(&self.server.page(), study) {
             say(format_args!("open link    {address}"))?;
         }
         say(format_args!(

@@ -194,7 +194,7 @@ impl Show {
         }
         let study = shown.study.unwrap_or_default();
         say(summary(&study))?;
-        if let Some(address) = open_address(owned.server.url(), &study) {
+        if let Some(address) = open_address(&owned.server.page(), &study) {
             say(format_args!("open link {address}"))?;
         }
         shown.participants.iter().try_for_each(|it| say(line(it)))
@@ -233,7 +233,7 @@ impl Links {
             added.map_err(refused)?.into_inner().links
         };
         for link in links.iter().filter(|link| link.test == self.test) {
-            print_link(link, owned.server.url(), owned.json)?;
+            print_link(link, &owned.server.page(), owned.json)?;
         }
         Ok(())
     }
@@ -445,7 +445,7 @@ impl Remove {
         }
         say(line(&removed.participant.unwrap_or_default()))?;
         match removed.replacement {
-            Some(link) => print_link(&link, owned.server.url(), false),
+            Some(link) => print_link(&link, &owned.server.page(), false),
             None => Ok(()),
         }
     }
@@ -472,8 +472,8 @@ impl DeleteParticipant {
     }
 }
 
-fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), CommandError> {
-    let address = address(server, &link.link);
+fn print_link(link: &v1::StudyLink, page: &str, json: bool) -> Result<(), CommandError> {
+    let address = address(page, &link.link);
     if json {
         let (number, pseudonym) = (link.number, &link.pseudonym);
         return say(json!({
@@ -492,13 +492,13 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
 }
 
 /// The page's address for a link.
-fn address(server: &str, link: &str) -> String {
-    format!("{}/study/{link}", server.trim_end_matches('/'))
+fn address(page: &str, link: &str) -> String {
+    format!("{page}/study/{link}")
 }
 
 /// The page's address for the open link, if there is one: the id at the panel belongs at its end if
 /// one is asked for.
-pub(super) fn open_address(server: &str, study: &v1::Study) -> Option<String> {
+pub(super) fn open_address(page: &str, study: &v1::Study) -> Option<String> {
     if study.open_link.is_empty() {
         return None;
     }
@@ -507,7 +507,7 @@ pub(super) fn open_address(server: &str, study: &v1::Study) -> Option<String> {
         .as_ref()
         .and_then(|it| it.recruiting.as_ref());
     let parameter = recruiting.map_or("", |it| &it.id_parameter);
-    let address = address(server, &study.open_link);
+    let address = address(page, &study.open_link);
     Some(match parameter {
         "" => address,
         parameter => format!("{address}?{parameter}="),
