@@ -26,6 +26,8 @@ pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
     ("sadness", -0.7, -0.4),
 ];
 
+/// Notice about words and expressions without a connection.
+const NOT_SENT: &str = "not sent: the connection is lost; send it again when it is back";
 /// Notice after the server decided for the person.
 const TOO_LATE: &str = "too late: this decision was taken without you";
 
@@ -130,7 +132,7 @@ pub(super) struct App {
     /// Notice about other games in progress.
     pub(super) others: Option<String>,
     /// The answer that is not acknowledged yet.
-    unacknowledged: Option<(u64, u32)>,
+    unacknowledged: Option<Do>,
     pub(super) left: bool,
 }
 
@@ -300,14 +302,10 @@ impl App {
 
     fn asked(&mut self, request: v1::DecisionRequest, now_ms: u64) -> Option<Do> {
         // The answer may have been lost with the connection: send it again.
-        if let Some((decision_id, action)) = self.unacknowledged
-            && decision_id == request.decision_id
+        if let Some(again @ Do::Answer { decision_id, .. }) = &self.unacknowledged
+            && *decision_id == request.decision_id
         {
-            return Some(Do::Answer {
-                decision_id,
-                action,
-                took_ms: 0,
-            });
+            return Some(again.clone());
         }
         self.unacknowledged = None;
         self.notice.clear();
@@ -348,10 +346,10 @@ impl App {
     }
 
     fn result(&mut self, result: &v1::AnswerResult) {
-        let about = (result.decision_id, result.action);
-        if self.unacknowledged == Some(about) {
-            self.unacknowledged = None;
-        }
+        self.unacknowledged.take_if(|answer| {
+            matches!(answer, Do::Answer { decision_id, action, .. }
+                if (*decision_id, *action) == (result.decision_id, result.action))
+        });
         let ours =
             |open: &mut Open| open.decision.request.decision_id == result.decision_id && open.sent;
         match result.status() {
@@ -414,7 +412,7 @@ impl App {
             (Dialog::Leave, KeyCode::Char('y' | 'Y')) => self.leave(),
             (Dialog::Express, KeyCode::Char(digit @ '1'..='6')) => {
                 let index = usize::try_from(u32::from(digit) - u32::from('1')).ok()?;
-                Some(Do::Express(index))
+                self.is_heard().then_some(Do::Express(index))
             }
             _ => None,
         }
@@ -441,6 +439,9 @@ impl App {
             KeyCode::Backspace => drop(self.line.pop()),
             KeyCode::Enter => {
                 self.dialog = None;
+                if !self.is_heard() {
+                    return None;
+                }
                 let words = std::mem::take(&mut self.line);
                 let words = words.trim();
                 return (!words.is_empty()).then(|| Do::Say(words.to_owned()));
@@ -450,6 +451,15 @@ impl App {
             _ => {}
         }
         None
+    }
+
+    /// Whether there is a connection. Unlike a decision, words and expressions are not asked for again.
+    fn is_heard(&mut self) -> bool {
+        let is_heard = self.link == Link::Live;
+        if !is_heard {
+            NOT_SENT.clone_into(&mut self.notice);
+        }
+        is_heard
     }
 
     fn leave(&mut self) -> Option<Do> {
@@ -515,12 +525,12 @@ impl App {
         open.sent = true;
         let decision_id = decision.request.decision_id;
         let action = u32::from(action.index());
-        self.unacknowledged = Some((decision_id, action));
-        Some(Do::Answer {
+        self.unacknowledged = Some(Do::Answer {
             decision_id,
             action,
             took_ms: now_ms.saturating_sub(open.since_ms),
-        })
+        });
+        self.unacknowledged.clone()
     }
 }
 

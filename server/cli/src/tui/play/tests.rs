@@ -325,6 +325,7 @@ fn a_lost_answer_is_sent_again() {
     session.app.take(Input::Lost("gone".into()), 5_000);
     assert!(session.screen().contains("Connection lost, reconnecting"));
     assert_eq!(session.press(KeyCode::Enter), None);
+    session.now_ms = 9_000;
     session.receive(Update::Attached(v1::Attached::default()));
     assert_eq!(session.app.link, Link::Live);
     let again = session.dealt.request();
@@ -333,9 +334,29 @@ fn a_lost_answer_is_sent_again() {
         ..again
     };
     let answer = session.receive(Update::Decision(again));
-    assert!(
-        matches!(answer, Some(Do::Answer { decision_id: id, action: same, .. }) if (id, same) == (decision_id, action))
-    );
+    let the_same = Do::Answer {
+        decision_id,
+        action,
+        took_ms,
+    };
+    assert_eq!(answer, Some(the_same));
+}
+
+#[test]
+fn what_is_said_without_a_connection_is_kept_until_there_is_one() {
+    let mut session = GameSession::new(&shifts(1), 3);
+    session.app.take(Input::Lost("gone".into()), 0);
+    let write = [KeyCode::Char('t'), KeyCode::Char('x'), KeyCode::Enter];
+    for key in write {
+        assert_eq!(session.press(key), None);
+    }
+    assert_eq!(session.app.line, "x");
+    assert!(session.app.notice.starts_with("not sent"));
+    session.press(KeyCode::Char('e'));
+    assert_eq!(session.press(KeyCode::Char('1')), None);
+    session.receive(Update::Attached(v1::Attached::default()));
+    session.press(KeyCode::Char('t'));
+    assert_eq!(session.press(KeyCode::Enter), Some(Do::Say("x".into())));
 }
 
 /// Times are recorded only on request.
