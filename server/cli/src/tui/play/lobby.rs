@@ -24,6 +24,8 @@ pub(super) struct Report {
     pub(super) games: Vec<v1::TournamentGame>,
     /// The person's next game, if not among those.
     pub(super) next: Option<v1::TournamentGame>,
+    /// Whether it is not known yet if there is one.
+    pub(super) is_searching: bool,
 }
 
 /// A tournament.
@@ -48,6 +50,7 @@ impl Report {
             standings: response.standings,
             games: response.games,
             next: None,
+            is_searching: false,
         })
     }
 
@@ -115,7 +118,8 @@ impl Lobby {
         };
         let drawn = rounds && tournament.round < tournament.rounds;
         let open = tournament.state() == v1::TournamentState::Open;
-        !report.is_over() && (open || drawn || report.own_game(self.me).is_some())
+        let has_game = report.is_searching || report.own_game(self.me).is_some();
+        !report.is_over() && (open || drawn || has_game)
     }
 
     /// Notes the result of a game.
@@ -266,6 +270,9 @@ impl Lobby {
         let tournament = &report.tournament;
         let (round, rounds) = (tournament.round, tournament.rounds);
         let left = tournament.games.saturating_sub(tournament.games_over);
+        if report.is_searching {
+            return "Your next game is not known yet.".to_owned();
+        }
         if report.is_out(self.me) {
             return "You are eliminated; the others continue.".to_owned();
         }

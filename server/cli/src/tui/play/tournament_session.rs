@@ -208,5 +208,6 @@ pub(super) fn report(
         standings: standings.collect(),
         games,
         next: None,
+        is_searching: false,
     }
 }
