@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::connect::ServerArg;
+use super::narration::clean;
 use super::numbers::counted;
 use super::tournament::words::state;
 use super::{CommandError, pages, say};
@@ -57,6 +58,9 @@ struct Disconnect {
     server: ServerArg,
     /// Number of the client, as `chefshat admin clients` prints it.
     client: u64,
+    /// Print the result as a JSON line.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -79,6 +83,9 @@ struct Closed {
     server: ServerArg,
     /// Its id.
     id: String,
+    /// Print the result as a JSON line.
+    #[arg(long)]
+    json: bool,
 }
 
 impl AdminCommand {
@@ -92,23 +99,27 @@ impl AdminCommand {
                 };
                 let mut service = service(&command.server).await?;
                 service.disconnect_client(request).await.map_err(refused)?;
-                say(format_args!("client {} is disconnected", command.client))?;
+                let client = command.client;
+                match command.json {
+                    true => say(json!({"event": "disconnected", "client": client}))?,
+                    false => say(format_args!("client {client} is disconnected"))?,
+                }
             }
             AdminAction::Close(Close {
-                what: What::Room(Closed { server, id }),
+                what: What::Room(Closed { server, id, json }),
             }) => {
                 let request = v1::AdminServiceCloseRoomRequest {
                     room_id: id.clone(),
                 };
-                service(&server)
-                    .await?
-                    .close_room(request)
-                    .await
-                    .map_err(refused)?;
-                say(format_args!("room {id} is closed"))?;
+                let answer =
+                    (service(&server).await?.close_room(request).await).map_err(refused)?;
+                match json {
+                    true => say(json!({"event": "closed", "room": answer.into_inner().room}))?,
+                    false => say(format_args!("room {id} is closed"))?,
+                }
             }
             AdminAction::Close(Close {
-                what: What::Tournament(Closed { server, id }),
+                what: What::Tournament(Closed { server, id, json }),
             }) => {
                 let request = v1::AdminServiceCloseTournamentRequest {
                     tournament_id: id.clone(),
@@ -116,10 +127,11 @@ impl AdminCommand {
                 let answer =
                     (service(&server).await?.close_tournament(request).await).map_err(refused)?;
                 let tournament = answer.into_inner().tournament.unwrap_or_default();
-                say(format_args!(
-                    "tournament {id} is {}",
-                    state(tournament.state())
-                ))?;
+                let state = state(tournament.state());
+                match json {
+                    true => say(json!({"event": "closed", "tournament": tournament}))?,
+                    false => say(format_args!("tournament {id} is {state}"))?,
+                }
             }
         }
         Ok(ExitCode::SUCCESS)
@@ -151,12 +163,12 @@ async fn clients(listing: &Listing) -> Result<ExitCode, CommandError> {
     let in_a_line = |client: &v1::ConnectedClient| {
         let token = match client.token_id.as_str() {
             "" => "no token",
-            token => token,
+            token => &clean(token, 16),
         };
         format!(
             "{:>8}  {:<24} {token:<8}  {}, {}",
             client.client_id,
-            client.address,
+            clean(&client.address, 64),
             counted(client.streams, "stream"),
             counted(client.calls, "call"),
         )
