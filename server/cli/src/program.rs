@@ -12,7 +12,7 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer as _, fmt};
 
 pub use crate::config::Invocation;
-use crate::error::{CommandError, is_broken_pipe};
+use crate::error::{CommandError, is_broken_pipe, tell};
 
 /// The commands of a program.
 pub trait Commands: Subcommand {
@@ -72,7 +72,12 @@ pub fn run<C: Commands>() -> ExitCode {
         // The reader of the output has closed the pipe, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            anstream::eprintln!("chefshat: {error}");
+            // A server's message may contain anything, such as the escape codes of a terminal.
+            let steers = |sign: char| sign.is_control() && !['\n', '\t'].contains(&sign);
+            tell(format_args!(
+                "chefshat: {}",
+                error.to_string().replace(steers, "")
+            ));
             ExitCode::FAILURE
         }
     }

@@ -197,9 +197,10 @@ fn seat_in_words(seat: &v1::Participant) -> String {
         return format!("{name}, imitates seat {number} of game {game}");
     }
     if !seat.built_in_agent.is_empty() {
-        return match name == seat.built_in_agent {
+        let agent = clean(&seat.built_in_agent, 64);
+        return match name == agent {
             true => format!("{name}, played by the server"),
-            false => format!("{name}, played by the server as {}", seat.built_in_agent),
+            false => format!("{name}, played by the server as {agent}"),
         };
     }
     if seat.at_table {
