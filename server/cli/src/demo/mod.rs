@@ -39,8 +39,8 @@ pub(super) struct Demo {
     /// Seed of the deals and the agents' choices, for a repeatable game.
     #[arg(long)]
     seed: Option<u64>,
-    /// The agents, seat by seat: random, random_unmasked, greedy, trained. Default: greedy and
-    /// random in turn.
+    /// The agents, seat by seat: random, random_unmasked, greedy, trained, monte_carlo. Default:
+    /// greedy and random in turn.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent)]
     agents: Vec<NamedAgent>,
     /// Milliseconds that each agent waits before a decision.
