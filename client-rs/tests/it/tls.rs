@@ -4,7 +4,6 @@ use std::io::Write as _;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use chefshat_client::v1::server_service_server::{ServerService, ServerServiceServer};
 use chefshat_client::{Client, ConnectOptions, Error, PlayError, RandomAgent, v1};
@@ -222,7 +221,6 @@ async fn a_connection_that_goes_silent_is_replaced() {
     let client = connect(silent_relay(server, silence).await).await;
     let options = quick();
     let played = client.play_with("ticket", RandomAgent::new(1), &options);
-    let outcome = tokio::time::timeout(Duration::from_secs(25), played);
-    outcome.await.expect("replaced by then").unwrap();
+    played.await.unwrap();
     assert!(fake.is_done());
 }
