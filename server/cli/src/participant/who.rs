@@ -13,7 +13,7 @@ use clap::builder::NonEmptyStringValueParser;
 
 use crate::connect::ServerArg;
 use crate::data_dir;
-use crate::error::CommandError;
+use crate::error::{CommandError, tell};
 
 /// The participant, and the data directory or server.
 #[derive(Args)]
@@ -115,7 +115,9 @@ fn fingerprint(text: &str) -> Result<String, &'static str> {
 /// Fails if files with the name were left as they are; warns of others.
 pub(super) fn check(skipped: &Skipped, name: &str) -> Result<(), CommandError> {
     for why in &skipped.other {
-        anstream::eprintln!("chefshat: warning: skipped a file that cannot be read: {why}");
+        tell(format_args!(
+            "chefshat: warning: skipped a file that cannot be read: {why}"
+        ));
     }
     if skipped.named.is_empty() {
         return Ok(());

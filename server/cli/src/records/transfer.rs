@@ -16,7 +16,7 @@ use tonic::{Code, Response, Status};
 use tonic_types::StatusExt as _;
 
 use super::super::connect::{SecretArgs, ServerArg};
-use super::super::error::is_broken_pipe;
+use super::super::error::{is_broken_pipe, tell};
 use super::super::numbers::counted;
 use super::super::{CommandError, progress, say};
 use super::filter::FilterArgs;
@@ -137,7 +137,10 @@ impl Stream {
             say(format_args!("{records} in {}", folder.display()))?;
         }
         for record in &received.unreadable {
-            anstream::eprintln!("not received: {}: {}", record.game_id, record.problem);
+            tell(format_args!(
+                "not received: {}: {}",
+                record.game_id, record.problem
+            ));
         }
         if let Err(error) = streamed {
             return Err(match received.last.as_str() {
@@ -210,7 +213,7 @@ impl Import {
         let bar = progress::of_items(self.files.len() as u64, "records");
         let mut failed = 0;
         let mut not_imported = |problem: &dyn std::fmt::Display| {
-            bar.suspend(|| anstream::eprintln!("not imported: {problem}"));
+            bar.suspend(|| tell(format_args!("not imported: {problem}")));
             bar.inc(1);
             failed += 1;
         };
@@ -235,7 +238,7 @@ impl Import {
                     // As when an import that broke off is begun again.
                     if error.reason() == Some("GAME_KNOWN") {
                         let file = file.display();
-                        bar.suspend(|| anstream::eprintln!("already there: {file}"));
+                        bar.suspend(|| tell(format_args!("already there: {file}")));
                         bar.inc(1);
                         continue;
                     }
