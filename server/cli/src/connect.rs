@@ -285,7 +285,7 @@ impl JoinArgs {
 
 /// The ticket in the environment. Read here and not by clap, for which a variable counts as much as a
 /// flag: it would conflict with a code that somebody typed.
-pub(crate) fn ticket_in_environment() -> Option<String> {
+pub fn ticket_in_environment() -> Option<String> {
     in_environment(TICKET)
 }
 

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use chefshat_cli::connect::ServerArg;
+use chefshat_cli::connect::{ServerArg, ticket_in_environment};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::name_key::NameKeyArg;
 use chefshat_cli::stops::Stops;
@@ -43,13 +43,9 @@ pub(super) struct Mcp {
     name: Option<String>,
     #[command(flatten)]
     name_key: NameKeyArg,
-    /// Ticket of a seat to resume.
-    #[arg(
-        long,
-        env = "CHEFSHAT_TICKET",
-        hide_env_values = true,
-        conflicts_with = "listen"
-    )]
+    /// Ticket of a seat to resume. CHEFSHAT_TICKET does the same, without --listen, and does not show in
+    /// lists of processes.
+    #[arg(long, conflicts_with = "listen")]
     ticket: Option<String>,
     /// File that keeps the tickets of the seats, readable only by you. Seats of games that it names are
     /// resumed, so that a client that starts again plays on.
@@ -83,7 +79,7 @@ impl Mcp {
         match self.listen {
             None => {
                 settings.seats.resume_kept().await?;
-                if let Some(ticket) = self.ticket {
+                if let Some(ticket) = self.ticket.or_else(ticket_in_environment) {
                     settings.seats.resume(ticket).await?;
                 }
                 tokio::select! {

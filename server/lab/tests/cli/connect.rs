@@ -60,6 +60,7 @@ fn what_is_typed_counts_more_than_a_variable() {
         ("play --code C", terminal),
         ("play --local", terminal),
         ("play --ticket T", terminal),
+        ("mcp --listen 192.0.2.1:1", "192.0.2.1:1"),
     ] {
         let mut command = program();
         command.args(line.split_whitespace());
