@@ -175,15 +175,14 @@ impl Http1 {
             .any(|end| self.read.ends_with(end));
         let is_empty = matches!(&self.read[..], b"\n" | b"\r\n");
         self.part = match self.part {
+            // Before a request.
+            Part::Head if is_empty => Part::Head,
             Part::Head if !is_end => return,
             Part::Head => {
                 // As the transport reads them.
                 let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
                 let mut request = httparse::Request::new(&mut headers);
-                // Empty lines before a request.
-                if let Ok(httparse::Status::Partial) = request.parse(&self.read) {
-                    return;
-                }
+                let _ = request.parse(&self.read);
                 let named = |name: &str| {
                     let named = |it: &&httparse::Header<'_>| it.name.eq_ignore_ascii_case(name);
                     request.headers.iter().find(named).map(|it| it.value)

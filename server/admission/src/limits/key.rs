@@ -136,7 +136,8 @@ impl Shares {
         remote: 100,
     };
 
-    /// For the tokens of one address, or the networks of one site, together: half, as for the server's machine, or more.
+    /// For the tokens of one address, or the networks of one site, together: half, as for the
+    /// server's machine, or more.
     pub fn of_addresses(self) -> Self {
         Self {
             remote: self.remote.max(Self::default().local),
