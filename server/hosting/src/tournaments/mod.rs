@@ -17,7 +17,6 @@ mod tests;
 mod views;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
@@ -41,7 +40,7 @@ use chefshat_room::ids::{GameId, RequestKey, TournamentToken, join_code, random_
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
-use state::{Common, TournamentShared, TournamentState};
+use state::{Common, TournamentShared, TournamentState, millis};
 use task::TournamentTask;
 
 /// Why a tournament was not created.
@@ -182,10 +181,6 @@ fn check_start(at_ms: Option<u64>, now_ms: u64) -> Result<(), SettingsProblem> {
         field: "start_at_ms",
         problem: problem.to_owned(),
     })
-}
-
-fn millis(duration: Duration) -> u64 {
-    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// The built-in participants of a tournament, named after their agents, numbered if there are

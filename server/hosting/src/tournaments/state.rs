@@ -1,6 +1,7 @@
 //! The state of a tournament, and what is shared besides it.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -141,4 +142,9 @@ pub(crate) fn restored(
     let mut state = TournamentState::new(core);
     stored.entries.iter().for_each(|entry| state.apply(entry));
     Ok((plan, state))
+}
+
+/// Whole milliseconds.
+pub(super) fn millis(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }

@@ -10,8 +10,7 @@ use tokio::time::Instant;
 use tracing::info;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use super::millis;
-use super::state::{Common, TournamentShared, TournamentState, restored};
+use super::state::{Common, TournamentShared, TournamentState, millis, restored};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::{Rooms, Withheld};
@@ -322,7 +321,7 @@ impl TournamentTask {
     }
 
     fn now_ms(&self) -> u64 {
-        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+        millis(self.clock.now())
     }
 
     fn join(&mut self, entry: Entry) -> Result<(usize, TournamentToken), JoinRefusal> {
