@@ -59,9 +59,7 @@ pub enum TokenFileError {
         problem: String,
     },
     /// It no longer exists, although it had tokens.
-    #[error(
-        "{0} is gone; restore it, or revoke its tokens one by one with `chefshat token revoke`"
-    )]
+    #[error("{0} is gone; restore it, and revoke tokens with `chefshat token revoke`")]
     Gone(PathBuf),
     /// A later version of the program wrote it.
     #[error("{path} was written by a newer version of chefshat (form {version}); use that version")]
