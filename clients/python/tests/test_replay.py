@@ -148,7 +148,8 @@ def test_the_need_for_the_program_is_explained(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(local_server, "_cargo_targets", list)
     # As if the package chefshat-server were not installed.
     monkeypatch.setitem(sys.modules, "chefshat_server", None)
-    with pytest.raises(ChefsHatError, match=r"BINARY_MISSING.*replay the records.*on this machine.*cargo build.*chefshat-lab") as refused:
+    words = r"BINARY_MISSING.*replay the records.*on this machine.*cargo build.*chefshat-lab"
+    with pytest.raises(ChefsHatError, match=words) as refused:
         replay.from_records(tmp_path)
     assert "address" not in refused.value.message
 

@@ -111,8 +111,10 @@ impl Decisions {
         let mut outputs = vec![(0.0, 0.0); self.taken.len()];
         network.outputs_of_all(&mut self.waiting, |waited, action, output| {
             let (of_taken, all) = &mut outputs[waited];
-            // NaN is the least.
-            let output = f64::from(output).max(-HIGHEST).min(HIGHEST).exp();
+            let output = match f64::from(output) {
+                it if it.is_nan() => 0.0,
+                it => it.clamp(-HIGHEST, HIGHEST).exp(),
+            };
             if action == self.taken[waited].1 {
                 *of_taken = output;
             }
@@ -120,7 +122,8 @@ impl Decisions {
         });
         let mut logs = vec![0.0; deals];
         for ((place, _), (of_taken, all)) in self.taken.iter().zip(outputs) {
-            logs[*place] += (LEAST + (1.0 - LEAST) * of_taken / all).ln();
+            let probability = if all > 0.0 { of_taken / all } else { 1.0 };
+            logs[*place] += (LEAST + (1.0 - LEAST) * probability).ln();
         }
         logs
     }
