@@ -1,7 +1,7 @@
 """A robot's own program for the driver `jsonlines`: prints the acts that it receives, and replies that each is done.
 
-Run `python samples/json_lines_robot.py 7700`, then `chefshat-robot robot --driver jsonlines:port=7700 --code JOIN-CODE`. In place of
-the prints, let your robot move; reply `failed` with a reason if it cannot.
+Run `python samples/json_lines_robot.py 7700`, then `chefshat-robot robot --driver jsonlines:port=7700 --code JOIN-CODE`. In place
+of the prints, let your robot move; reply `failed` with a reason if it cannot.
 """
 
 import json

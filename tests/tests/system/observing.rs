@@ -49,7 +49,7 @@ impl Observed {
         let scraped = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
         let metrics = scraped.local_addr().expect("bound");
-        let names = Origins::new(Vec::new(), Some(Vec::new()));
+        let names = Origins::new(&[], Some(Vec::new()));
         tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics()), names));
         tokio::spawn(server.serve(listener, std::future::pending()));
         Self {
