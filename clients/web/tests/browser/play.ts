@@ -26,6 +26,8 @@ export async function nextDecision(page: Page, before?: string): Promise<string 
   const waiting = page.waitForFunction((before) => {
     if (document.querySelector('[data-part~="result"] a[href^="/replay/"]')) return "over";
     const id = document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision;
+    // They count anew in each game, and the next one may have replaced the result already.
+    if (id && before && Number(id) < Number(before)) return "over";
     return id !== before && id;
   }, before);
   const found = await waiting.catch(async (cause) => {
