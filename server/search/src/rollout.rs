@@ -21,7 +21,7 @@ impl RolloutPolicy {
     }
 
     /// The network by which all seats play, if it decides alone.
-    fn shared_network(&self) -> Option<&Network> {
+    pub fn network(&self) -> Option<&Arc<Network>> {
         match self {
             RolloutPolicy::Kind(AgentKind::Trained) => Some(Network::trained()),
             RolloutPolicy::Kind(_) => None,
@@ -58,7 +58,7 @@ pub fn rollouts(
     seat: Seat,
     policy: &RolloutPolicy,
 ) -> Vec<Worth> {
-    if let Some(network) = policy.shared_network() {
+    if let Some(network) = policy.network() {
         return side_by_side(starts, seat, network);
     }
     let alone = |(mut game, mut action, seed): (Game, ActionId, [u8; 32])| {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use chefshat_agents::{AgentKind, Network};
+use chefshat_agents::Network;
 use chefshat_engine::{ActionId, Event, Game, Observation, RuleSet, Seat};
 use chefshat_proto::v1;
 use chefshat_record::convert::{
@@ -161,11 +161,8 @@ impl Position {
         policy: Policy,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let rules = self.rule_set();
-        let belief = match rollout_policy(policy, rules).map_err(|error| refused(py, error))? {
-            RolloutPolicy::Kind(AgentKind::Trained) => Belief::of(Network::trained(), rules),
-            RolloutPolicy::Kind(_) => None,
-            RolloutPolicy::Network(network) => Belief::of(&network, rules),
-        };
+        let policy = rollout_policy(policy, rules).map_err(|error| refused(py, error))?;
+        let belief = (policy.network()).and_then(|network| Belief::of(network, rules));
         let words = "only a network for these rules says how likely actions are: trained or a file";
         let belief = belief.ok_or_else(|| refused(py, field("agent", words)))?;
         let logs = in_chunks(py, deals, |part| {
