@@ -88,8 +88,8 @@ if command -v timeout > /dev/null; then set -- timeout --kill-after=60 "$limit" 
 TIMEFORMAT=$'\n%U %S'; time "$@"
 "#;
 
-/// What `timeout` exits with.
-const HUNG: i32 = 124;
+/// What `timeout` exits with when it has ended a command, and when that took a SIGKILL.
+const HUNG: [i32; 2] = [124, 137];
 
 /// The longest time of a command, on the busiest machine.
 const LIMIT: Duration = Duration::from_mins(40);
@@ -128,7 +128,7 @@ fn captured_within(command: &Command, limit: Duration) -> Captured {
     let printed = format!("{}{errors}", String::from_utf8_lossy(&output.stdout));
     let result = match output.status.code() {
         Some(0) => Ok(()),
-        Some(HUNG) => Err(Failure::new(format!(
+        Some(code) if HUNG.contains(&code) => Err(Failure::new(format!(
             "`{}` has not ended in {} s",
             line(command),
             limit.as_secs()

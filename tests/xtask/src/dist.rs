@@ -74,6 +74,7 @@ pub(crate) fn run(
 ) -> Result<(), Failure> {
     let dist = places.dist();
     let stage = places.own.join("dist");
+    let host = Platform::host()?;
     let mut commit = String::new();
     steps.run("check that all is committed", || {
         commit = committed(places)?;
@@ -105,7 +106,7 @@ pub(crate) fn run(
         stage: &stage,
         date: read(git(places).args(["log", "-1", "--format=%ct", &commit]))?,
         commit,
-        host: Platform::host()?,
+        host,
     };
     for platform in &PLATFORMS {
         let name = platform.processor;
@@ -125,7 +126,7 @@ pub(crate) fn run(
     steps.run("source", || release.source())?;
     let cyclonedx = setup::cargo_cyclonedx(places)?;
     steps.run("what it contains", || release.contents(cyclonedx))?;
-    match setup::images() {
+    match setup::debian_programs(&setup::FOR_IMAGES) {
         Ok(()) => steps.run("image", || release.image())?,
         Err(failure) => steps.skip("image", &failure.to_string()),
     }

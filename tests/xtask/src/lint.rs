@@ -6,7 +6,7 @@ use std::process::Command;
 
 use crate::command::{self, cargo, python_command};
 use crate::failure::Failure;
-use crate::places::{NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
+use crate::places::{PYTHON_PACKAGES, Places};
 use crate::setup::{self, at};
 use crate::steps::Steps;
 use crate::web;
@@ -41,19 +41,10 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         Box::new(|steps| {
             documents(places, steps)?;
             licences(places, steps)?;
-            if places.python_packages().is_empty() {
-                steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
-            } else {
-                steps.run("set up Python", || setup::python_packages(places))?;
-                python(places, steps)?;
-            }
-            if places.has_web_package() {
-                steps.run("set up web", || setup::web_package(places))?;
-                web::check(places, steps)
-            } else {
-                steps.skip("tsc, biome", NO_WEB_PACKAGE);
-                Ok(())
-            }
+            steps.run("set up Python", || setup::python_packages(places))?;
+            python(places, steps)?;
+            steps.run("set up web", || setup::web_package(places))?;
+            web::check(places, steps)
         }),
     ])
 }
@@ -199,7 +190,7 @@ pub(crate) fn licences(places: &Places, steps: &mut Steps) -> Result<(), Failure
 
 /// The linter, formatter and type checker of the Python packages, which must be set up.
 pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    for package in places.python_packages() {
+    for package in PYTHON_PACKAGES {
         let checks = [
             ("ruff check", "ruff", &["check", "."][..]),
             ("ruff format", "ruff", &["format", "--check", "."]),

@@ -5,20 +5,15 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
 
-/// Why steps are skipped if there are no [`Places::python_packages`].
-pub(crate) const NO_PYTHON_PACKAGE: &str = "missing: clients/python/pyproject.toml";
-
-/// Why steps are skipped if [`Places::has_node_package`] is false.
-pub(crate) const NO_NODE_PACKAGE: &str = "missing: clients/node/package-lock.json";
-
-/// Why steps are skipped if [`Places::has_web_package`] is false.
-pub(crate) const NO_WEB_PACKAGE: &str = "missing: clients/web/package-lock.json";
-
 /// The Python SDK.
 pub(crate) const CLIENTS: &str = "clients/python";
 
 /// The Python package that tests docker/. The other Python packages are clients.
 pub(crate) const DEPLOYMENT: &str = "tests/deployment";
+
+/// The Python packages, relative to the source tree: the SDK, then those built on it.
+pub(crate) const PYTHON_PACKAGES: [&str; 4] =
+    [CLIENTS, "clients/paper", "clients/robot", DEPLOYMENT];
 
 /// The folders used by this program, all absolute.
 pub(crate) struct Places {
@@ -53,23 +48,9 @@ impl Places {
         self.target.join("debug/libchefshat_native.so")
     }
 
-    /// The Python packages in the source tree, relative to its root: the SDK, then those built on
-    /// it.
-    pub(crate) fn python_packages(&self) -> Vec<&'static str> {
-        let all = [CLIENTS, "clients/paper", "clients/robot", DEPLOYMENT];
-        all.into_iter()
-            .filter(|package| self.root.join(package).join("pyproject.toml").exists())
-            .collect()
-    }
-
     /// The JavaScript agent.
     pub(crate) fn node_package(&self) -> PathBuf {
         self.root.join("clients/node")
-    }
-
-    /// Whether there is a JavaScript agent to set up.
-    pub(crate) fn has_node_package(&self) -> bool {
-        self.node_package().join("package-lock.json").exists()
     }
 
     /// The agent in C++.
@@ -90,11 +71,6 @@ impl Places {
     /// The page for people.
     pub(crate) fn web_package(&self) -> PathBuf {
         self.root.join("clients/web")
-    }
-
-    /// Whether there is a page to build.
-    pub(crate) fn has_web_package(&self) -> bool {
-        self.web_package().join("package-lock.json").exists()
     }
 
     /// Where the server expects the built page: the only place in the source tree that is written

@@ -2,15 +2,16 @@
 //! Everything is created inside the build folder and recreated only when its sources have changed;
 //! a Debian package is installed only if it is missing.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use crate::command::{cargo, read, run, succeeds};
 use crate::failure::Failure;
-use crate::places::Places;
+use crate::places::{PYTHON_PACKAGES, Places};
 
 /// The version of cargo-deny for which deny.toml is written.
 const CARGO_DENY: &str = "0.20.2";
@@ -35,25 +36,45 @@ const CPP_PACKAGES: [&str; 7] = [
     "protobuf-compiler-grpc",
 ];
 
-/// A program, and the Debian package that has it.
+/// A program, by its name or path, and the Debian package that has it.
 pub(crate) type Program = (&'static str, &'static str);
+
+/// Spreads clients over the nodes of a cluster.
+pub(crate) const HAPROXY: Program = ("/usr/sbin/haproxy", "haproxy");
+
+/// Makes a disk fail.
+pub(crate) const STRACE: Program = ("strace", "strace");
+
+/// Loads the shipped dashboard and alerts.
+pub(crate) const PROMETHEUS: Program = ("promtool", "prometheus");
+
+/// Has the terminals of the tests of commands.
+pub(crate) const TMUX: Program = ("tmux", "tmux");
+
+/// Runs the sample that analyses a study.
+pub(crate) const R: Program = ("Rscript", "r-base-core");
 
 /// What the tests in Rust use, and the agent in C++ is built with.
 pub(crate) const FOR_RUST: [Program; 7] = [
     ("psql", "postgresql"),
-    ("/usr/sbin/haproxy", "haproxy"),
-    ("strace", "strace"),
-    ("promtool", "prometheus"),
-    ("tmux", "tmux"),
-    ("Rscript", "r-base-core"),
+    HAPROXY,
+    STRACE,
+    PROMETHEUS,
+    TMUX,
+    R,
     ("grpc_cpp_plugin", "protobuf-compiler-grpc"),
 ];
 
-/// What the tests of docker/ use.
-pub(crate) const FOR_DEPLOYMENT: [Program; 5] = [
+/// The proxies of docker/, what makes the certificates of docs/access.md, and a browser.
+pub(crate) const FOR_DEPLOYMENT: [Program; 4] = [
     ("openssl", "openssl"),
     ("/usr/sbin/nginx", "nginx"),
-    ("/usr/sbin/haproxy", "haproxy"),
+    HAPROXY,
+    CHROMIUM,
+];
+
+/// Builds images, and the systems they are based on.
+pub(crate) const FOR_IMAGES: [Program; 2] = [
     ("buildah", "buildah"),
     ("/usr/sbin/debootstrap", "debootstrap"),
 ];
@@ -74,7 +95,7 @@ const MADE_FROM: &str = ".made-from";
 pub(crate) fn python_packages(places: &Places) -> Result<(), Failure> {
     let mut made_from = String::new();
     let mut install = Vec::new();
-    for package in places.python_packages() {
+    for package in PYTHON_PACKAGES {
         let package = places.root.join(package);
         let project = package.join("pyproject.toml");
         let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
@@ -219,27 +240,6 @@ fn is_new_enough(version: &str) -> bool {
         .is_some_and(|main: u32| main >= OLDEST_NODE)
 }
 
-/// The browser for the tests of the page.
-pub(crate) fn chromium() -> Result<(), Failure> {
-    debian_programs(&[CHROMIUM])
-}
-
-/// strace, with which a test makes a disk fail.
-pub(crate) fn strace() -> Result<(), Failure> {
-    if succeeds("strace", &["--version"]) {
-        return Ok(());
-    }
-    debian_package("strace")
-}
-
-/// Prometheus, which loads the shipped dashboard and alerts in a test.
-pub(crate) fn prometheus() -> Result<(), Failure> {
-    if succeeds("promtool", &["--version"]) {
-        return Ok(());
-    }
-    debian_package("prometheus")
-}
-
 /// PostgreSQL, of which tests start servers of their own.
 pub(crate) fn postgresql() -> Result<(), Failure> {
     let versions = fs::read_dir("/usr/lib/postgresql").into_iter().flatten();
@@ -250,55 +250,6 @@ pub(crate) fn postgresql() -> Result<(), Failure> {
         true => Ok(()),
         false => debian_package("postgresql"),
     }
-}
-
-/// tmux, for the tests of terminal commands.
-pub(crate) fn tmux() -> Result<(), Failure> {
-    if succeeds("tmux", &["-V"]) {
-        return Ok(());
-    }
-    debian_package("tmux")
-}
-
-/// R, for the sample that analyses a study.
-pub(crate) fn r() -> Result<(), Failure> {
-    if succeeds("Rscript", &["--version"]) {
-        return Ok(());
-    }
-    debian_package("r-base-core")
-}
-
-/// The proxies that are Debian packages, for the tests of docker/proxies, and what makes the
-/// certificates of docs/access.md.
-pub(crate) fn proxies() -> Result<(), Failure> {
-    if !succeeds("openssl", &["version"]) {
-        debian_package("openssl")?;
-    }
-    if !succeeds("/usr/sbin/nginx", &["-v"]) {
-        debian_package("nginx")?;
-    }
-    haproxy()
-}
-
-/// HAProxy, which spreads clients over the nodes of a cluster in tests.
-pub(crate) fn haproxy() -> Result<(), Failure> {
-    if succeeds("/usr/sbin/haproxy", &["-v"]) {
-        return Ok(());
-    }
-    debian_package("haproxy")
-}
-
-/// Builds images, and the systems they are based on.
-pub(crate) fn images() -> Result<(), Failure> {
-    for (program, name) in [
-        ("buildah", "buildah"),
-        ("/usr/sbin/debootstrap", "debootstrap"),
-    ] {
-        if !succeeds(program, &["--version"]) {
-            debian_package(name)?;
-        }
-    }
-    Ok(())
 }
 
 /// cargo-deny, which checks licences and sources. Returns its command.
@@ -408,19 +359,14 @@ fn venv_by_pip(folder: &Path, install: &[&str]) -> Result<(), Failure> {
 
 /// Installs the packages of missing programs at once, which takes a fraction of one at a time.
 pub(crate) fn debian_programs(wanted: &[Program]) -> Result<(), Failure> {
-    let is_missing = |program: &str| !is_on_path(program);
-    let mut packages: Vec<&str> = wanted
-        .iter()
-        .filter(|(program, _)| is_missing(program))
-        .map(|(_, package)| *package)
-        .collect();
-    packages.dedup();
-    if packages.contains(&"protobuf-compiler-grpc") {
+    let missing = wanted.iter().filter(|(program, _)| !is_on_path(program));
+    let mut packages: BTreeSet<&str> = missing.map(|(_, package)| *package).collect();
+    if packages.contains("protobuf-compiler-grpc") {
         packages.extend(CPP_PACKAGES);
     }
     match packages.is_empty() {
         true => Ok(()),
-        false => debian_packages(&packages),
+        false => debian_packages(&Vec::from_iter(packages)),
     }
 }
 
@@ -444,7 +390,15 @@ fn debian_packages(names: &[&str]) -> Result<(), Failure> {
             names.join(" ")
         )));
     }
-    run(Command::new("apt-get").args(["update", "--quiet"]))?;
+    // Once: without a network, it waits for minutes.
+    static UPDATED: OnceLock<bool> = OnceLock::new();
+    let update = || run(Command::new("apt-get").args(["update", "--quiet"])).is_ok();
+    if !UPDATED.get_or_init(update) {
+        return Err(Failure::new(format!(
+            "`apt-get update` failed, so there is no {}",
+            names.join(", ")
+        )));
+    }
     let mut install = Command::new("apt-get");
     install.args(["install", "--yes", "--quiet", "--no-install-recommends"]);
     install.args(names);

@@ -11,9 +11,7 @@ use serde_json::Value;
 use crate::command::{cargo, git, python_command, read, with_environment};
 use crate::failure::Failure;
 use crate::lint::{self, OPTIONAL_FEATURES};
-use crate::places::{
-    CLIENTS, DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places,
-};
+use crate::places::{CLIENTS, DEPLOYMENT, PYTHON_PACKAGES, Places};
 use crate::setup;
 use crate::steps::{Lane, Steps};
 use crate::web;
@@ -30,8 +28,8 @@ pub(crate) enum Part {
     Node,
     /// The page for people in clients/web, including browser tests.
     Web,
-    /// Backups, the tournament of friends in docs/access.md, and the proxies and images of docker/,
-    /// with agents in all languages and a browser.
+    /// Backups, the tournament of friends in docs/access.md, the proxies of docker/, and with --slow
+    /// its images, with agents in all languages and a browser.
     Deployment,
     /// Those that the changes since origin/main can break, committed or not.
     Changed,
@@ -56,7 +54,7 @@ fn broken_by(file: &str) -> &'static [Part] {
         ("clients/cpp/", &[Rust]),
         ("clients/python/", &[Rust, Python, Deployment]),
         ("clients/paper/", &[Python]),
-        ("clients/robot/", &[Python]),
+        ("clients/robot/", &[Python, Deployment]),
         ("docs/", &[Rust, Python, Deployment]),
         ("docker/", &[Rust, Deployment]),
         ("tests/deployment/", &[Deployment]),
@@ -111,14 +109,12 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         return Ok(());
     }
     let wants = |part| parts.contains(&part);
-    let has_python = !places.python_packages().is_empty();
-    let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
     let deployment = wants(Part::Deployment);
-    let needs_python = has_python && (wants(Part::Rust) || wants(Part::Python) || deployment);
+    let needs_python = wants(Part::Rust) || wants(Part::Python) || deployment;
     // The long tests of the page analyse the data of a study.
-    let analyses = has_python && slow && wants(Part::Web);
-    let needs_node = has_node && (wants(Part::Rust) || wants(Part::Node) || deployment);
-    let needs_page = has_web && (wants(Part::Rust) || wants(Part::Web) || deployment);
+    let analyses = slow && wants(Part::Web);
+    let needs_node = wants(Part::Rust) || wants(Part::Node) || deployment;
+    let needs_page = wants(Part::Rust) || wants(Part::Web) || deployment;
 
     // Downloads wait while Cargo computes.
     steps.beside(vec![
@@ -133,10 +129,10 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             if needs_python || analyses {
                 steps.run("set up Python", || setup::python_packages(places))?;
             }
-            if lint && has_python {
+            if lint {
                 lint::python(places, steps)?;
             }
-            if wants(Part::Python) && has_python {
+            if wants(Part::Python) {
                 for which in VERSIONS {
                     let set_up = || setup::versions(places, which);
                     steps.run(&format!("set up the {which} versions"), set_up)?;
@@ -151,7 +147,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             if needs_page {
                 web::run(places, steps)?;
             }
-            if lint && has_web {
+            if lint {
                 web::check(places, steps)?;
             }
             Ok(())
@@ -164,8 +160,11 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             if deployment {
                 wanted.extend(setup::FOR_DEPLOYMENT);
             }
-            if wants(Part::Web) || deployment {
+            if wants(Part::Web) {
                 wanted.push(setup::CHROMIUM);
+            }
+            if deployment && slow {
+                wanted.extend(setup::FOR_IMAGES);
             }
             // What is still missing afterwards is reported where it is needed.
             if let Err(failure) = setup::debian_programs(&wanted) {
@@ -192,31 +191,27 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             Ok(())
         })?;
         steps.run("PostgreSQL", setup::postgresql)?;
-        steps.run("HAProxy", setup::haproxy)?;
+        steps.run("HAProxy", || setup::debian_programs(&[setup::HAPROXY]))?;
         // Tests that need something missing on this machine report that they are skipped.
-        if let Err(failure) = setup::strace() {
-            steps.skip("a disk that does not sync", &failure.to_string());
-        }
-        if let Err(failure) = setup::prometheus() {
-            steps.skip("the dashboard in Prometheus", &failure.to_string());
-        }
-        if let Err(failure) = setup::tmux() {
-            steps.skip("commands at a terminal", &failure.to_string());
-        }
-        if let Err(failure) = setup::r() {
-            steps.skip("the analysis in R", &failure.to_string());
+        for (program, tests) in [
+            (setup::STRACE, "a disk that does not sync"),
+            (setup::PROMETHEUS, "the dashboard in Prometheus"),
+            (setup::TMUX, "commands at a terminal"),
+            (setup::R, "the analysis in R"),
+        ] {
+            if let Err(failure) = setup::debian_programs(&[program]) {
+                steps.skip(tests, &failure.to_string());
+            }
         }
         for run in std::mem::take(&mut in_rust.whole) {
             lanes.push(Box::new(|steps| of_all(steps, [run])));
         }
     }
-    if wants(Part::Python) && !has_python {
-        steps.skip("pytest", NO_PYTHON_PACKAGE);
-    } else if needs_python {
+    if needs_python {
         steps.run("install the native module", || setup::native_module(places))?;
     }
     if wants(Part::Python) {
-        for package in places.python_packages() {
+        for package in PYTHON_PACKAGES {
             // The longest suite has the most processes.
             let processes: &[&str] = match package {
                 CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
@@ -233,10 +228,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         }
     }
     if wants(Part::Web) {
-        match has_web {
-            true => lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow))),
-            false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
-        }
+        lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow)));
     }
     if wants(Part::Rust) {
         let mut runs = in_rust.crates;
@@ -251,26 +243,23 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     if deployment {
         lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
     }
-    if wants(Part::Web) && has_web {
+    if wants(Part::Web) {
         lanes.push(Box::new(|steps| web::test(places, steps)));
     }
-    if wants(Part::Python) && has_python {
+    if wants(Part::Python) {
         lanes.push(Box::new(|steps| {
             of_all(steps, VERSIONS.map(|which| pytest_with(places, which)))
         }));
     }
     if wants(Part::Node) {
-        match has_node {
-            true => lanes.push(Box::new(|steps| {
-                let mut node = with_environment(places, Command::new("node"));
-                steps.program("node --test", node.arg("--test").current_dir(places.node()))
-            })),
-            false => steps.skip("node --test", NO_NODE_PACKAGE),
-        }
+        lanes.push(Box::new(|steps| {
+            let mut node = with_environment(places, Command::new("node"));
+            steps.program("node --test", node.arg("--test").current_dir(places.node()))
+        }));
     }
-    // The longest first. A failure stops only what depends on it, so that one run shows all of them.
+    // A failure stops only what depends on it, so that one run shows all of them.
     let mut outcomes = vec![steps.beside(lanes)];
-    if slow && wants(Part::Python) && has_python {
+    if slow && wants(Part::Python) {
         // Builds the page again, in the folder of its tests.
         outcomes.push(wheels::run(places, steps, &wheels::HOST, "release", true));
     }
@@ -373,12 +362,12 @@ fn with_extent(tests: &mut Command, options: Options) {
 /// The tests of docker/ and of what the documents tell to type.
 fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(), Failure> {
     steps.run("set up proxies and a browser", || {
-        setup::proxies().and_then(|()| setup::chromium())
+        setup::debian_programs(&setup::FOR_DEPLOYMENT)
     })?;
     let (name, mut command) = pytest(places, DEPLOYMENT, &[]);
     steps.program(&name, &mut command)?;
     if slow {
-        if let Err(failure) = setup::images() {
+        if let Err(failure) = setup::debian_programs(&setup::FOR_IMAGES) {
             steps.skip("images", &failure.to_string());
         }
         let (name, mut command) = pytest(places, DEPLOYMENT, &["-m", "slow"]);

@@ -7,15 +7,12 @@ use std::process::Command;
 
 use crate::command::with_environment;
 use crate::failure::Failure;
-use crate::places::{NO_WEB_PACKAGE, Places};
+use crate::places::Places;
 use crate::setup::{self, at};
 use crate::steps::Steps;
 
 /// Sets up the page's package and builds the page.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    if !places.has_web_package() {
-        return Err(Failure::new(NO_WEB_PACKAGE));
-    }
     steps.run("set up web", || setup::web_package(places))?;
     steps.program("build the page", npm(places).args(["run", "build"]))?;
     steps.run("put the page in place", || {
@@ -41,7 +38,7 @@ pub(crate) fn test_in_browser(
     steps: &mut Steps,
     slow: bool,
 ) -> Result<(), Failure> {
-    match setup::chromium() {
+    match setup::debian_programs(&[setup::CHROMIUM]) {
         Ok(()) => {
             let mut tests = npm(places);
             tests.args(["run", "test:browser"]);

@@ -108,16 +108,14 @@ fn in_book(root: &Path, file: &str, target: &str) -> Result<String, String> {
 pub(super) fn check_order(settings: &str, found: &BTreeSet<String>) -> Result<(), Failure> {
     let quoted = settings.lines().filter(|line| !line.starts_with('#'));
     let quoted = quoted.flat_map(|line| line.split('"').skip(1).step_by(2));
-    let named: BTreeSet<String> = quoted
-        .filter(|text| text.ends_with(".md"))
-        .map(str::to_owned)
-        .collect();
+    let named = quoted.filter(|text| text.ends_with(".md"));
+    let named: BTreeSet<String> = named.map(str::to_owned).collect();
     let wrong: Vec<&String> = named.symmetric_difference(found).collect();
     if wrong.is_empty() {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "the pages and `nav` in {} differ by {wrong:?}: list each page there once",
+        "the pages and `nav` in {} differ by {wrong:?}: list each page there",
         SETTINGS
     )))
 }

@@ -298,29 +298,24 @@ impl Page<'_> {
 
     /// The type of a field.
     fn kind(&self, message: &Value, field: &Value) -> String {
-        let scalar = || {
-            let kind = field["type"].as_str().unwrap_or_default();
-            kind.trim_start_matches("TYPE_").to_lowercase()
-        };
-        let Some(full) = field["typeName"].as_str() else {
-            return match field["label"].as_str() {
-                Some("LABEL_REPEATED") => format!("repeated {}", scalar()),
-                _ if field["proto3Optional"] == true => format!("optional {}", scalar()),
-                _ => scalar(),
-            };
-        };
+        let full = field["typeName"].as_str();
         let entry = list(message, "nestedType").iter().find(|nested| {
-            nested["options"]["mapEntry"] == true && full.ends_with(&format!(".{}", name(nested)))
+            let is_type = full.is_some_and(|full| full.ends_with(&format!(".{}", name(nested))));
+            nested["options"]["mapEntry"] == true && is_type
         });
         if let Some(entry) = entry {
             let of = |index: usize| self.kind(entry, &list(entry, "field")[index]);
             return format!("map of {} to {}", of(0), of(1));
         }
-        let link = self.link(full);
+        let scalar = || {
+            let kind = field["type"].as_str().unwrap_or_default();
+            kind.trim_start_matches("TYPE_").to_lowercase()
+        };
+        let kind = full.map_or_else(scalar, |full| self.link(full));
         match field["label"].as_str() {
-            Some("LABEL_REPEATED") => format!("repeated {link}"),
-            _ if field["proto3Optional"] == true => format!("optional {link}"),
-            _ => link,
+            Some("LABEL_REPEATED") => format!("repeated {kind}"),
+            _ if field["proto3Optional"] == true => format!("optional {kind}"),
+            _ => kind,
         }
     }
 
