@@ -179,13 +179,24 @@ pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failur
     steps.program("clang-format", &mut format)
 }
 
-/// The licences and sources of what is built with, which change with Cargo.lock alone. The tool is
-/// compiled first, which takes minutes.
+/// The licences and sources of what is built with, which change with Cargo.lock alone, and what is
+/// known against it. The tool is compiled first, which takes minutes.
 pub(crate) fn licences(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    let deny = |arguments: &[&str]| {
+        command::run(in_root(places, setup::cargo_deny(places)?).args(arguments))
+    };
     steps.run("cargo deny", || {
-        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
-        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
-    })
+        deny(&["--workspace", "check", "licenses", "bans", "sources"])
+    })?;
+    match deny(&["fetch", "db"]) {
+        Ok(()) => steps.run("advisories", || {
+            deny(&["--workspace", "check", "--disable-fetch", "advisories"])
+        }),
+        Err(failure) => {
+            steps.skip("advisories", &failure.to_string());
+            Ok(())
+        }
+    }
 }
 
 /// The linter, formatter and type checker of the Python packages, which must be set up.
