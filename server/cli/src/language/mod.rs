@@ -19,11 +19,12 @@ const MAX_REASON_BYTES: usize = 3_500;
 
 /// The rules that a model needs at the table, in short. docs/rules.md has all of them.
 pub const RULES: &str = "\
-The rules in short: get rid of your cards first. A lower number is rarer and beats a higher one. A play is cards of one number; a joker (J) counts as one \
+The rules in short: get rid of your cards first. A lower number is rarer and beats a higher one: there is one 1, there are two 2s, and so on. A play is cards of one number; a joker (J) counts as one \
 more of them, and a joker alone is the weakest play. You must play a lower number than the board shows, and at least as many cards, or pass; a pass \
 counts until the pizza is done. When everybody else has passed, the board is cleared and whoever played last leads with anything. 11* is the Golden \
 card, which opens the Shift. Places give points, with which the game ends. Between Shifts, the last two give their rarest cards to the first two, who \
-give back any.";
+give back any. Before that, whoever was dealt two jokers may declare: the last one a Food Fight, which reverses the roles of this exchange, anybody else \
+Dinner is Served, and nothing is exchanged.";
 
 /// The rules of one game beside [`RULES`], in a sentence.
 pub fn this_game(rules: Option<&RuleSet>) -> String {
