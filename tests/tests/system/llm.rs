@@ -532,19 +532,31 @@ async fn a_server_that_names_the_limit_of_an_answer_otherwise_is_understood() {
 /// Otherwise a key that does not work would play as the fallback under the model's name.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_model_that_cannot_be_asked_takes_no_seat() {
-    let forbidden: Script = |_, _| {
+    let keyless: Script = |_, _| {
         let body = json!({"error": {"message": format!("no such key: {KEY}")}});
         Said::Other(StatusCode::UNAUTHORIZED, body.to_string().into_bytes())
     };
+    let forbidden: Script = |_, _| Said::Other(StatusCode::FORBIDDEN, Vec::new());
+    let refused: Script = |_, _| {
+        let body = json!({"error": {"message": "temperature is unsupported"}});
+        Said::Other(StatusCode::BAD_REQUEST, body.to_string().into_bytes())
+    };
     let unknown: Script = |_, _| Said::Other(StatusCode::NOT_FOUND, Vec::new());
+    let cut: Script = |_, _| {
+        let body = br#"{"choices": [{"message": {"content": "rea"#;
+        Said::Other(StatusCode::OK, body.to_vec())
+    };
     let moved: Script = |_, _| Said::Other(StatusCode::PERMANENT_REDIRECT, Vec::new());
     let page: Script = |_, _| Said::Other(StatusCode::OK, b"<html>".to_vec());
     let endless: Script = |_, _| Said::Other(StatusCode::OK, vec![b' '; 3 << 20]);
-    let cases: [(Script, &str); 5] = [
-        (forbidden, "401 Unauthorized: no such key: …"),
+    let cases: [(Script, &str); 8] = [
+        (keyless, "401 Unauthorized: no such key: …"),
+        (forbidden, "403 Forbidden"),
+        (refused, "400 Bad Request: temperature is unsupported"),
         (unknown, "404 Not Found"),
         (moved, "308 Permanent Redirect, which means another address"),
         (page, "the answer is not a chat completion"),
+        (cut, "the answer is not a chat completion"),
         (endless, "the answer has more than"),
     ];
     for (script, why) in cases {
