@@ -191,6 +191,10 @@ def test_the_debian_package_has_a_service(system: System) -> None:
     output, _ = server.communicate(timeout=PATIENCE_S)
     assert server.returncode == 0, output
     assert system.type("stat --format %U /var/lib/chefshat/games.sqlite3").strip() == "chefshat"
+    # An upgrade, where systemd runs.
+    note = r"printf '#!/bin/sh\necho \"$@\" >> /told\n' > /usr/bin/systemctl; chmod +x /usr/bin/systemctl"
+    system.type(f"mkdir -p /run/systemd/system; {note}; dpkg --install chefshat_{VERSION}_amd64.deb")
+    assert system.type("cat /told").splitlines() == ["daemon-reload", "try-restart chefshat.service"]
     system.type("dpkg --remove chefshat")
     assert list((system.root / "var/lib/chefshat/records").iterdir())
     assert (system.root / "etc/chefshat/chefshat.toml").exists()
