@@ -11,6 +11,7 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 DEFAULT_ROUNDS = 5
 DEFAULT_SECONDS = 2.0
@@ -18,15 +19,20 @@ DEFAULT_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Measured:
-    """Decisions per second in each round, and the total number of decisions."""
+    """Decisions per second, and per second of a core, in each round, and the total number of decisions."""
 
     name: str
     per_second: list[float]
+    per_core_second: list[float]
     decisions: int
 
     def median(self) -> float:
-        """The median of the rounds."""
+        """The median of the rounds, decisions per second."""
         return statistics.median(self.per_second)
+
+    def median_of_a_core(self) -> float:
+        """The median of the rounds, decisions per second of a core."""
+        return statistics.median(self.per_core_second)
 
 
 def parser(description: str, example: str) -> argparse.ArgumentParser:
@@ -47,7 +53,12 @@ def measure(name: str, play: Callable[[], int], options: argparse.Namespace) -> 
     """Measures `play`, which plays briefly and returns its number of decisions. A first, short round does not count."""
     _round(play, options.seconds / 4)
     rounds = [_round(play, options.seconds) for _ in range(options.rounds)]
-    return Measured(name, [decisions / seconds for decisions, seconds in rounds], sum(decisions for decisions, _ in rounds))
+    return Measured(
+        name,
+        [decisions / seconds for decisions, seconds, _ in rounds],
+        [decisions / busy for decisions, _, busy in rounds],
+        sum(decisions for decisions, _, _ in rounds),
+    )
 
 
 def show(measured: list[Measured], options: argparse.Namespace, **facts: object) -> None:
@@ -57,6 +68,7 @@ def show(measured: list[Measured], options: argparse.Namespace, **facts: object)
             {
                 "name": row.name,
                 "decisions_per_second": row.median(),
+                "decisions_per_core_second": row.median_of_a_core(),
                 "rounds": row.per_second,
                 "decisions": row.decisions,
             }
@@ -67,17 +79,29 @@ def show(measured: list[Measured], options: argparse.Namespace, **facts: object)
         return
     print(", ".join(f"{key} {value}" for key, value in {**facts, "Python": platform.python_version()}.items()))
     width = max(len(row.name) for row in measured)
-    print(f"{'':{width}}  {'decisions/s':>12}  {'least':>12}  {'most':>12}  {'decisions':>12}")
+    print(f"{'':{width}}  {'decisions/s':>12}  {'least':>12}  {'most':>12}  {'/core second':>12}  {'decisions':>12}")
     for row in measured:
         print(
             f"{row.name:{width}}  {row.median():>12,.0f}  {min(row.per_second):>12,.0f}  {max(row.per_second):>12,.0f}"
-            f"  {row.decisions:>12,}"
+            f"  {row.median_of_a_core():>12,.0f}  {row.decisions:>12,}"
         )
 
 
-def _round(play: Callable[[], int], seconds: float) -> tuple[int, float]:
+def _round(play: Callable[[], int], seconds: float) -> tuple[int, float, float]:
+    """Returns decisions, seconds, and seconds of processors."""
     decisions = 0
-    begun = time.perf_counter()
+    busy, begun = _processor_seconds(), time.perf_counter()
     while (taken := time.perf_counter() - begun) < seconds:
         decisions += play()
-    return decisions, taken
+    return decisions, taken, _processor_seconds() - busy
+
+
+def _processor_seconds() -> float:
+    """The processor time of this process and, on Linux, of those that it has started, such as a server."""
+    children = [child for of_thread in Path("/proc/self/task").glob("*/children") for child in of_thread.read_text().split()]
+    ticks = 0
+    for child in children:
+        # Of the fields after the name, which may have spaces.
+        user, system = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[11:13]
+        ticks += int(user) + int(system)
+    return time.process_time() + ticks / os.sysconf("SC_CLK_TCK")
