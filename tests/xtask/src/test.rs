@@ -427,7 +427,7 @@ mod tests {
                 "clients/web/src/main.tsx",
                 &[Part::Web, Part::Deployment][..],
             ),
-            ("clients/robot/README.md", &[Part::Python]),
+            ("clients/robot/README.md", &[Part::Python, Part::Deployment]),
             ("docker/Dockerfile", &[Part::Rust, Part::Deployment]),
             ("README.md", &[Part::Rust, Part::Python, Part::Deployment]),
             ("server/src/lib.rs", &ALL),
