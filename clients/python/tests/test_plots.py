@@ -47,6 +47,14 @@ def test_legends_do_not_cover_lines() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["learner", "paper"]
 
 
+def test_legends_with_long_labels_stay_in_the_picture() -> None:
+    labels = [" ".join([word] * letters) for word, letters in [("width", 18), ("rate", 40), ("steps", 1)]]
+    panel = Panel("Over time", "decisions", "points", lines=[Line(label, [1, 2], [0, 1]) for label in labels])
+    for panels in ([panel], [panel, panel]):
+        for legend in legends_beside_panels(Figure("curves", "All of it", panels)):
+            assert [text.get_text().replace("\n", " ") for text in legend.get_texts()] == labels
+
+
 def legends_beside_panels(figure: Figure) -> list[Legend]:
     """Returns the legends of a figure. None touches a panel or leaves the picture."""
     with mpl.rc_context(plots.STYLE):

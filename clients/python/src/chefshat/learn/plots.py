@@ -2,6 +2,7 @@
 
 import io
 import json
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
@@ -31,9 +32,12 @@ PANEL_SIZE = (4.6, 3.2)
 TITLE_HEIGHT = 0.4
 # Total width of the points of a category; categories are 1 apart.
 DODGE = 0.5
-# Columns of a legend below two or more panels, and below one.
+# Columns of a legend below two or more panels, and below one, at most.
 LEGEND_COLUMNS = 3
 PANEL_LEGEND_COLUMNS = 2
+# Inches of a legend: beside a label, and of a letter, on average.
+LEGEND_MARK = 0.6
+LEGEND_LETTER = 0.062
 # Inches: a line of a legend; ticks and x label, below which a panel's legend is placed.
 LEGEND_LINE = 0.2
 BELOW_TICKS = 0.45
@@ -164,24 +168,37 @@ def _explain_all(figure: Figure, canvas: Canvas, panels: Sequence[Axes], columns
         handles |= _handles(axes)
     levels = {level.label for panel in figure.panels for level in panel.levels}
     names = sorted(handles, key=lambda name: name in levels)
-    lines = ceil(len(names) / (PANEL_LEGEND_COLUMNS if columns == 1 else LEGEND_COLUMNS))
-    canvas.legend([handles[name] for name in names], names, loc="outside lower center", ncols=ceil(len(names) / lines))
-    return lines
+    lines, labels = _laid_out(names, PANEL_LEGEND_COLUMNS if columns == 1 else LEGEND_COLUMNS, PANEL_SIZE[0] * columns)
+    canvas.legend([handles[name] for name in names], labels, loc="outside lower center", ncols=ceil(len(names) / lines))
+    return lines * _most_lines(labels)
 
 
 def _explain(axes: Axes) -> int:
     """Adds a legend below one panel, where it hides no line. Returns its number of lines."""
     handles = _handles(axes)
+    lines, labels = _laid_out(list(handles), PANEL_LEGEND_COLUMNS, PANEL_SIZE[0])
     below = ScaledTranslation(0, -BELOW_TICKS, axes.figure.dpi_scale_trans)
     axes.legend(
         list(handles.values()),
-        list(handles),
+        labels,
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),
         bbox_transform=axes.transAxes + below,
-        ncols=PANEL_LEGEND_COLUMNS,
+        ncols=ceil(len(handles) / lines),
     )
-    return ceil(len(handles) / PANEL_LEGEND_COLUMNS)
+    return lines * _most_lines(labels)
+
+
+def _laid_out(names: Sequence[str], columns: int, width: float) -> tuple[int, list[str]]:
+    """Returns the rows of a legend of at most this width in inches, and its labels, with line breaks where one alone is wider."""
+    longest = max(map(len, names), default=0)
+    columns = max(1, min(columns, int(width / (LEGEND_MARK + LEGEND_LETTER * longest))))
+    letters = int((width / columns - LEGEND_MARK) / LEGEND_LETTER)
+    return ceil(len(names) / columns) or 1, [textwrap.fill(name, letters) for name in names]
+
+
+def _most_lines(labels: Sequence[str]) -> int:
+    return max((label.count("\n") + 1 for label in labels), default=0)
 
 
 def _handles(axes: Axes) -> dict[str, Any]:
