@@ -190,7 +190,7 @@ pub(crate) fn licences(places: &Places, steps: &mut Steps) -> Result<(), Failure
     })?;
     match deny(&["fetch", "db"]) {
         Ok(()) => steps.run("advisories", || {
-            deny(&["--workspace", "check", "--disable-fetch", "advisories"])
+            deny(&["--workspace", "check", "advisories"])
         }),
         Err(failure) => {
             steps.skip("advisories", &failure.to_string());
