@@ -7,9 +7,10 @@ use std::sync::LazyLock;
 use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
 use tokio::runtime::{Builder, Runtime};
+use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
-use tracing_subscriber::{EnvFilter, Layer as _, fmt};
+use tracing_subscriber::{Layer as _, fmt};
 
 pub use crate::config::Invocation;
 use crate::error::{CommandError, is_broken_pipe, tell};
@@ -112,13 +113,12 @@ fn runtime() -> io::Result<Runtime> {
 }
 
 fn start_logging<C: Commands>(cli: &CommandLine<C>) -> Result<Tracing, CommandError> {
-    let filter = EnvFilter::try_new(&cli.log)
+    let filter: Targets = (cli.log.parse())
         .map_err(|error| format!("--log {:?}: {error}; use for example info", cli.log))?;
     let terminal = io::stderr().is_terminal();
-    let filter = if terminal && cli.command.draws() {
-        EnvFilter::new("off")
-    } else {
-        filter
+    let filter = match terminal && cli.command.draws() {
+        true => Targets::new(),
+        false => filter,
     };
     let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
     let lines = fmt::layer().with_ansi(colours).with_writer(io::stderr);
