@@ -406,5 +406,5 @@ def test_an_engine_of_another_version_is_refused() -> None:
     from chefshat import _native
 
     _native._check_version(chefshat_native.__version__)
-    with pytest.raises(ImportError, match=r"chefshat-native 0\.0\.1 does not fit chefshat .*: pip install chefshat-native=="):
+    with pytest.raises(ImportError, match=r"chefshat-native 0\.0\.1 does not fit chefshat .*: install chefshat_native-"):
         _native._check_version("0.0.1")

@@ -108,7 +108,7 @@ def test_the_network_of_trained_needs_a_package(
     assert main([*(out if argument == "OUT" else argument for argument in arguments), *address, "--json"]) == 1
     error = json.loads(capsys.readouterr().out)
     assert (error["event"], error["reason"]) == ("error", "NATIVE_MISSING")
-    assert "pip install 'chefshat[native]'" in error["message"]
+    assert "pip install ./chefshat_native-*.whl" in error["message"]
     assert not list(tmp_path.iterdir())
 
 

@@ -254,6 +254,16 @@ def test_old_backups_are_deleted_only_after_a_new_one(tmp_path: Path, backup_fai
     assert old.exists() == backup_fails
 
 
+def test_no_index_is_asked_for_our_packages() -> None:
+    """A stranger may have registered their names there: files and folders are installed, and their names are not looked up."""
+    readmes = [*(ROOT / "clients").glob("*/README.md"), *(ROOT / "clients/python").glob("*/README.md")]
+    for page in [*(ROOT / page for page in PAGES), *readmes]:
+        text = page.read_text(encoding="utf-8")
+        assert "--find-links" not in text, page
+        for line in re.findall(r"pip install ([^\n`&]*)", text):
+            assert not re.search(r"(?<![\w./-])chefshat(?!gym)[\w-]*\b", line), f"{page}: {line}"
+
+
 def test_no_command_is_hidden_in_a_block_of_another_language() -> None:
     for page in PAGES:
         text = (ROOT / page).read_text(encoding="utf-8")

@@ -12,9 +12,13 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import chefshat
@@ -200,23 +204,53 @@ def test_the_debian_package_has_a_service(system: System) -> None:
     assert (system.root / "etc/chefshat/chefshat.toml").exists()
 
 
-def test_the_wheels_work_without_a_network(python_system: System, tmp_path: Path) -> None:
+def test_the_wheels_are_installed_as_the_page_says(python_system: System, tmp_path: Path) -> None:
     wheels = sorted(DIST.glob("*.whl"))
     assert len(wheels) == 7
-    house = tmp_path / "house"
+    downloads = tmp_path / "downloads"
     sdk = next(wheel for wheel in wheels if wheel.name.startswith("chefshat-"))
-    run(
-        [sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(house), "--find-links", str(DIST), f"{sdk}[envs]", "pip"]
-    )
-    shutil.copytree(house, python_system.root / "house")
+    run([sys.executable, "-m", "pip", "download", "--quiet", "--dest", str(downloads), f"{sdk}[envs]", "pip"])
     python_system.download(*wheels, ROOT / "clients/python/tools/try_wheels.py")
-    offline = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": "/house"}
-    output = python_system.type(block("python3 -m venv"), **offline)
-    assert "action_mask" in output, output
-    assert "place" in output, output
-    activated = ". .venv/bin/activate; export PATH; "
-    others = "./chefshat_paper-*.whl ./chefshat_robot-*.whl"
-    python_system.type(f"{activated} pip install {others}; chefshat-robot --help; python -I try_wheels.py", **offline)
+    with index(downloads, tmp_path / "index") as (url, asked):
+        output = python_system.type(block("python3 -m venv"), PIP_INDEX_URL=url)
+        assert "action_mask" in output, output
+        assert "place" in output, output
+        activated = ". .venv/bin/activate; export PATH; "
+        others = "./chefshat_paper-*.whl ./chefshat_robot-*.whl"
+        tried = "chefshat-robot --help; python -I try_wheels.py"
+        python_system.type(f"{activated} pip install {others}; {tried}", PIP_INDEX_URL=url)
+    assert "gymnasium" in asked
+    # A stranger may have registered these there.
+    assert not [name for name in asked if name.startswith("chefshat")]
+
+
+@contextmanager
+def index(wheels: Path, folder: Path) -> Iterator[tuple[str, set[str]]]:
+    """An index of Python packages with the wheels of others in a folder. Yields its address, and the names it was asked for."""
+    for wheel in wheels.iterdir():
+        name = re.sub(r"[-_.]+", "-", wheel.name.split("-")[0]).lower()
+        if not name.startswith("chefshat"):
+            (folder / name).mkdir(parents=True)
+            shutil.copy(wheel, folder / name)
+    asked: set[str] = set()
+
+    class Handler(SimpleHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.add(self.path.split("/")[1])
+            super().do_GET()
+
+        def log_message(self, *_: object) -> None:
+            """Prints nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=folder))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/", asked
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
 
 
 def test_the_image_plays(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Self-play training on a Ray cluster with RLlib: its runners play batches of games, its algorithm learns by masked PPO in JAX.
 
-    pip install 'chefshat[native,ray,server]'
+    pip install '.[ray]' ../../target/wheels/chefshat_*_$(uname -m).whl    # after cargo xtask wheels
     python samples/cluster/rllib_ppo.py                 # every runner plays in its own process
     python samples/cluster/rllib_ppo.py --servers 2     # over the network, on two servers of this machine
     RAY_ADDRESS=auto python samples/cluster/rllib_ppo.py --runners 32 --address lab1:50051 lab2:50051 --iterations 1000

@@ -1,6 +1,6 @@
 """Masked PPO in one file with JAX, in the manner of CleanRL: one seat learns against built-in agents, in many games at once.
 
-    pip install 'chefshat[envs,learn,native]'
+    pip install '.[envs,learn]' ./native
     python samples/learning/ppo_jax.py
     python samples/learning/ppo_jax.py --opponents greedy --decisions 3000000
 

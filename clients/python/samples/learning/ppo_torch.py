@@ -1,6 +1,6 @@
 """Masked PPO in one file with PyTorch, in the manner of CleanRL: one seat learns against built-in agents, in many games at once.
 
-    pip install 'chefshat[envs,native]' torch
+    pip install '.[envs]' ./native torch
     python samples/learning/ppo_torch.py
     python samples/learning/ppo_torch.py --opponents greedy --decisions 3000000 --tensorboard runs/greedy
 

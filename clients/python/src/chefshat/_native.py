@@ -27,7 +27,7 @@ def _check_version(native: str) -> None:
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         own = importlib.metadata.version("chefshat")
         if own != native:
-            raise ImportError(f"chefshat-native {native} does not fit chefshat {own}: pip install chefshat-native=={own}")
+            raise ImportError(f"chefshat-native {native} does not fit chefshat {own}: install chefshat_native-{own}-*.whl")
 
 
 _check_version(chefshat_native.__version__)

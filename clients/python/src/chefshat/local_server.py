@@ -59,7 +59,7 @@ def find_binary(
         return max(built, key=lambda path: path.stat().st_mtime)
     raise ChefsHatError(
         "BINARY_MISSING",
-        f"the program chefshat is required to {purpose}. Install it (pip install 'chefshat[server]'), put it on the PATH, "
+        f"the program chefshat is required to {purpose}. Install it (pip install ./chefshat_server-*.whl), put it on the PATH, "
         f"set the environment variable {BINARY}, or build it (cargo build --release --bin chefshat) and run this in the "
         f"repository{instead}",
     )

@@ -385,8 +385,8 @@ def _engine() -> Iterator[ModuleType]:
         import chefshat_native
     except ModuleNotFoundError as error:
         words = (
-            "search needs the package chefshat-native: pip install 'chefshat[native]', or ask a server for the estimates of a live "
-            "decision with Client.evaluate"
+            "search needs the package chefshat-native: pip install ./chefshat_native-*.whl (a file of each release), or ask a "
+            "server for the estimates of a live decision with Client.evaluate"
         )
         raise ChefsHatError("NATIVE_MISSING", words) from error
     try:

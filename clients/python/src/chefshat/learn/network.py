@@ -296,7 +296,7 @@ def load(path: str | os.PathLike[str]) -> Network:
         try:
             import chefshat_native
         except ModuleNotFoundError as error:
-            words = f"the network of `{TRAINED}` is in the package chefshat-native: pip install 'chefshat[native]'"
+            words = f"the network of `{TRAINED}` is in the package chefshat-native: pip install ./chefshat_native-*.whl"
             raise ChefsHatError("NATIVE_MISSING", words) from error
         file = chefshat_native.trained_network()
     elif os.fspath(path) == TRAINED_POINTS:
