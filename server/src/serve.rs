@@ -623,6 +623,7 @@ fn routes(
         Arc::clone(connections),
         retention,
         Arc::new(participants),
+        closing.clone(),
     );
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
@@ -677,6 +678,7 @@ fn routes(
             recorded,
             Arc::clone(tournaments),
             config,
+            closing.clone(),
         ))
         .max_decoding_message_size(longest("chefshat.v1.RecordService")),
     )

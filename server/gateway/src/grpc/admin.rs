@@ -1,6 +1,5 @@
 //! `AdminService`: operates the server. The role that its calls need stands in `access`.
 
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -10,22 +9,22 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::pseudonym::{Named, Pseudonym, is_fingerprint};
-use futures::Stream;
 use futures::future::join_all;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
-use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
 use tonic::metadata::{Binary, MetadataValue};
 use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
+use super::follow::{self, Responses};
 use super::forward::{FromPeer, Gateway};
 use super::limits::charged;
 use super::lookup::Lookup;
 use super::pages;
 use super::status::{
-    Refusal, field, owner_unreachable, reader_too_slow, room_unknown, shutting_down, status,
-    store_failed, tournament_unknown,
+    Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
+    tournament_unknown,
 };
 use super::tournaments;
 use crate::connections::{Client, Connections};
@@ -53,28 +52,31 @@ pub struct AdminCalls {
     connections: Arc<Connections>,
     retention: Retention,
     participants: Arc<Participants>,
+    /// Cancelled when all streams must end.
+    closing: CancellationToken,
 }
 
 impl AdminCalls {
-    /// Creates the service for this server.
+    /// Creates the service for this server; `closing` ends its streams.
     pub fn new(
         lookup: Lookup,
         connections: Arc<Connections>,
         retention: Retention,
         participants: Arc<Participants>,
+        closing: CancellationToken,
     ) -> Self {
         Self {
             lookup,
             connections,
             retention,
             participants,
+            closing,
         }
     }
 }
 
 impl AdminService for AdminCalls {
-    type ExportParticipantStream =
-        Pin<Box<dyn Stream<Item = Result<v1::ExportParticipantResponse, Status>> + Send>>;
+    type ExportParticipantStream = Responses<v1::ExportParticipantResponse>;
 
     async fn list_clients(
         &self,
@@ -192,46 +194,46 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<Self::ExportParticipantStream>, Status> {
         let request = request.into_inner();
         let who = given(request.name, request.name_fingerprint)?;
-        let (sender, responses) = mpsc::channel(1);
         let (lines, mut exported) = mpsc::channel(1);
         let participants = Arc::clone(&self.participants);
-        let gathering = async move { participants.export(&who, &lines).await };
-        let forwarding = async move {
-            let (mut count, mut is_read) = (0_u64, true);
-            while let Some(line) = exported.recv().await {
-                count += 1;
-                let response = v1::ExportParticipantResponse {
-                    line,
-                    ..v1::ExportParticipantResponse::default()
+        let (response, exporting) = follow::stream(
+            self.closing.clone(),
+            move |sender| async move {
+                let (what, limit) = ("the export", FOLLOW_SEND_TIMEOUT);
+                let forwarding = async {
+                    let mut count = 0_u64;
+                    while let Some(line) = exported.recv().await {
+                        count += 1;
+                        let response = v1::ExportParticipantResponse {
+                            line,
+                            ..v1::ExportParticipantResponse::default()
+                        };
+                        follow::send_part(&sender, response, what, limit).await?;
+                    }
+                    Ok(count)
                 };
-                let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
-                is_read = sent.await.is_ok();
-                if !is_read {
-                    break;
+                let gathering = async move {
+                    let gathered = participants.export(&who, &lines).await;
+                    gathered.map_err(data_failed)
+                };
+                let (count, skipped) = tokio::try_join!(forwarding, gathering)?;
+                if count == 0 && skipped.named.is_empty() {
+                    return Err(status(
+                        Code::NotFound,
+                        "PARTICIPANT_UNKNOWN",
+                        "nothing is stored under this name; give the exact name the participant played under",
+                        [("field", "name")],
+                    ));
                 }
-            }
-            (sender, count, is_read)
-        };
-        tokio::spawn(short("one call", async move {
-            let (gathered, (sender, count, is_read)) = tokio::join!(gathering, forwarding);
-            let last = match gathered {
-                _ if !is_read => Err(reader_too_slow("the export", FOLLOW_SEND_TIMEOUT)),
-                Ok(skipped) if count == 0 && skipped.named.is_empty() => Err(status(
-                    Code::NotFound,
-                    "PARTICIPANT_UNKNOWN",
-                    "nothing is stored under this name; give the exact name the participant played under",
-                    [("field", "name")],
-                )),
-                Ok(skipped) => Ok(v1::ExportParticipantResponse {
+                let last = v1::ExportParticipantResponse {
                     line: String::new(),
                     unread_files: skipped.named,
-                }),
-                Err(error) => Err(data_failed(error)),
-            };
-            // The client may have gone.
-            let _ = sender.send_timeout(last, FOLLOW_SEND_TIMEOUT).await;
-        }));
-        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+                };
+                follow::send_part(&sender, last, what, limit).await
+            },
+        );
+        tokio::spawn(short("one call", exporting));
+        Ok(response)
     }
 
     async fn delete_participant(

@@ -1,19 +1,27 @@
-//! Sends a tournament to one follower. `tournaments` computes the messages, for all followers
-//! together.
+//! Streams that one task sends to one client: how they end, and what is sent to the followers of a
+//! tournament. `tournaments` computes those messages, for all followers together.
 
+use std::pin::Pin;
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_proto::v1::{FollowTournamentResponse, TournamentState};
+use futures::Stream;
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::time::{Instant, sleep_until};
+use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
-use tonic::{Code, Status};
+use tonic::{Code, Response, Status};
 
-use super::status::{self, status};
+use super::status::{self, Refusal, reader_too_slow, status};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_hosting::config::{FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT};
 use chefshat_hosting::tournaments::{ComputeError, TournamentHandle};
 
-type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
+/// The messages of a stream.
+pub(super) type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+/// What sends them.
+pub(super) type Sender<T> = mpsc::Sender<Result<T, Status>>;
 
 /// Sends the tournament whenever it changes, until it is over.
 ///
@@ -22,7 +30,7 @@ type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
 pub(super) async fn follow(
     handle: &Arc<TournamentHandle>,
     permits: &Arc<Semaphore>,
-    sender: &Sender,
+    sender: &Sender<FollowTournamentResponse>,
 ) -> Result<(), Status> {
     let mut changes = handle.changes();
     loop {
@@ -40,49 +48,76 @@ pub(super) async fn follow(
             return Ok(());
         }
         sleep_until(sent + FOLLOW_INTERVAL).await;
-        changed(&mut changes, handle.stopped(), sender).await?;
+        changed(&mut changes, handle.stopped()).await?;
     }
 }
 
-/// Runs what sends a stream, until it ends or the server closes its streams, and tells the client why
-/// it ends. What `sending` holds, such as a place among the followers, is given back before: the client
-/// may not read.
-pub(super) async fn run<M>(
+/// The stream that `sending` sends, and what runs that.
+pub(super) fn stream<M, F>(
     closing: CancellationToken,
-    sender: mpsc::Sender<Result<M, Status>>,
-    sending: impl Future<Output = Result<(), Status>>,
-) {
-    let sent = closing.run_until_cancelled(sending).await;
-    end(
-        &sender,
-        sent.unwrap_or_else(|| Err(status::shutting_down())),
-    )
-    .await;
+    sending: impl FnOnce(Sender<M>) -> F,
+) -> (Response<Responses<M>>, impl Future<Output = ()>)
+where
+    M: Send + 'static,
+    F: Future<Output = Result<(), Status>>,
+{
+    let (sender, receiver) = mpsc::channel(1);
+    let sending = sending(sender.clone());
+    let responses: Responses<M> = Box::pin(ReceiverStream::new(receiver));
+    (Response::new(responses), run(closing, sender, sending))
 }
 
-/// Ends a stream, with the reason if there is one. Waits until the client receives it or has gone.
-pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, sent: Result<(), Status>) {
+/// Runs what sends a stream, until it ends, its client has gone, or the server closes its streams, and
+/// tells the client why it ends. What `sending` holds, such as a place among the followers, is given
+/// back before: the client may not read.
+async fn run<M>(
+    closing: CancellationToken,
+    sender: Sender<M>,
+    sending: impl Future<Output = Result<(), Status>>,
+) {
+    let sent = tokio::select! {
+        sent = sending => sent,
+        () = closing.cancelled() => Err(status::shutting_down()),
+        () = sender.closed() => return,
+    };
     if let Err(status) = sent {
         // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
     }
 }
 
-/// Waits for a change of what a task does, as long as there is a follower to send it to.
+/// Takes a place among the followers for a stream of `what`.
 ///
 /// # Errors
-/// The task has stopped: the follower can follow again, where the unit runs then. Or the follower has
-/// gone: then the status is for nobody.
-pub(super) async fn changed<C, M>(
+/// The caller has too many.
+pub(super) fn place(
+    followers: &Arc<FairSemaphore>,
+    key: Key,
+    what: &'static str,
+) -> Result<Permit, Status> {
+    followers.try_take(key).ok_or_else(|| {
+        let refused = Refused {
+            reason: "TOO_MANY_FOLLOWERS",
+            what,
+            limit: followers.share_of(key) as u64,
+            retry_after: FOLLOW_SEND_TIMEOUT,
+        };
+        Refusal::from(refused).into()
+    })
+}
+
+/// Waits for a change of what a task does.
+///
+/// # Errors
+/// The task has stopped: the follower can follow again, where the unit runs then.
+pub(super) async fn changed<C>(
     changes: &mut watch::Receiver<C>,
     stopped: impl Future<Output = ()>,
-    sender: &mpsc::Sender<M>,
 ) -> Result<(), Status> {
     tokio::select! {
         biased;
         changed = changes.changed() => changed.map_err(|_| status::shutting_down()),
         () = stopped => Err(status::shutting_down()),
-        () = sender.closed() => Err(Status::cancelled("the follower has gone")),
     }
 }
 
@@ -104,10 +139,7 @@ fn is_over(message: &FollowTournamentResponse) -> bool {
 ///
 /// # Errors
 /// It is not received in time, or the follower has gone.
-pub(super) async fn send<M>(
-    sender: &mpsc::Sender<Result<M, Status>>,
-    message: M,
-) -> Result<(), Status> {
+pub(super) async fn send<M>(sender: &Sender<M>, message: M) -> Result<(), Status> {
     let sent = sender.send_timeout(Ok(message), FOLLOW_SEND_TIMEOUT);
     sent.await.map_err(|_| {
         let seconds = FOLLOW_SEND_TIMEOUT.as_secs();
@@ -120,12 +152,26 @@ pub(super) async fn send<M>(
     })
 }
 
+/// Sends a part of `what`.
+///
+/// # Errors
+/// It is not received within `limit`, or the client has gone.
+pub(super) async fn send_part<M>(
+    sender: &Sender<M>,
+    part: M,
+    what: &str,
+    limit: Duration,
+) -> Result<(), Status> {
+    let sent = sender.send_timeout(Ok(part), limit).await;
+    sent.map_err(|_| reader_too_slow(what, limit))
+}
+
 #[cfg(test)]
 mod tests {
     use std::future::pending;
     use std::pin::pin;
 
-    use futures::FutureExt as _;
+    use futures::{FutureExt as _, StreamExt as _};
     use tokio::sync::oneshot::error::TryRecvError;
     use tonic_types::StatusExt as _;
 
@@ -146,17 +192,14 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_client_that_does_not_read_holds_nothing_and_learns_why_its_stream_ends() {
-        let (closing, (sender, mut receiver)) = (CancellationToken::new(), mpsc::channel(1));
+        let closing = CancellationToken::new();
         let (place, mut free) = tokio::sync::oneshot::channel::<()>();
-        let sending = {
-            let sender = sender.clone();
-            async move {
-                let _place = place;
-                send(&sender, 1).await?;
-                pending().await
-            }
-        };
-        let running = tokio::spawn(run(closing.clone(), sender, sending));
+        let (stream, running) = stream(closing.clone(), move |sender| async move {
+            let _place = place;
+            send(&sender, 1).await?;
+            pending().await
+        });
+        let (mut stream, running) = (stream.into_inner(), tokio::spawn(running));
         tokio::task::yield_now().await;
         assert!(
             free.try_recv()
@@ -165,15 +208,29 @@ mod tests {
         closing.cancel();
         free.await.expect_err("it is given back");
         assert_eq!(
-            receiver.recv().await.expect("a message").expect("no error"),
+            stream.next().await.expect("a message").expect("no error"),
             1
         );
-        let ended = receiver.recv().await.expect("the reason");
+        let ended = stream.next().await.expect("the reason");
         assert_eq!(
             ended.expect_err("it is incomplete").code(),
             Code::Unavailable
         );
         running.await.expect("no panic");
+    }
+
+    #[tokio::test]
+    async fn what_is_sent_to_nobody_ends() {
+        let (place, free) = tokio::sync::oneshot::channel::<()>();
+        let (stream, running) = stream::<(), _>(CancellationToken::new(), move |_| async move {
+            let _place = place;
+            pending().await
+        });
+        let mut running = pin!(running);
+        assert!(running.as_mut().now_or_never().is_none());
+        drop(stream);
+        running.await;
+        free.await.expect_err("it is given back");
     }
 
     #[tokio::test(start_paused = true)]
@@ -189,20 +246,13 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_follower_waits_for_a_change_the_end_of_the_task_or_its_own_end() {
+    async fn a_follower_waits_for_a_change_or_the_end_of_the_task() {
         let (count, mut changes) = watch::channel(0);
-        let (sender, receiver) = mpsc::channel::<()>(1);
         count.send_replace(1);
-        let last = changed(&mut changes, async {}, &sender).await;
+        let last = changed(&mut changes, async {}).await;
         last.expect("what changed last is sent before");
-        let stopped = changed(&mut changes, async {}, &sender).await;
+        let stopped = changed(&mut changes, async {}).await;
         assert_eq!(stopped.expect_err("the end").code(), Code::Unavailable);
-        let mut waiting = pin!(changed(&mut changes, pending(), &sender));
-        assert!(waiting.as_mut().now_or_never().is_none());
-        drop(receiver);
-        assert_eq!(
-            waiting.await.expect_err("it has gone").code(),
-            Code::Cancelled
-        );
+        assert!(changed(&mut changes, pending()).now_or_never().is_none());
     }
 }

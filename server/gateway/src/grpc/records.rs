@@ -1,7 +1,6 @@
 //! `RecordService`: lists, reads and imports records of finished games.
 
 use std::iter::Peekable;
-use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::cost::{Cost, shapes};
@@ -13,14 +12,12 @@ use chefshat_record::jsonl::excess;
 use chefshat_record::replay;
 use chefshat_record::signature::SigningKey;
 use chefshat_record::summary::summary;
-use futures::Stream;
 use prost::Message as _;
-use tokio::sync::mpsc;
 use tokio::time::timeout;
-use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
-use super::follow::end;
+use super::follow::{self, Responses, Sender};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lookup::RecordView;
@@ -29,7 +26,7 @@ use super::pages;
 use super::recorded::{Recorded, SERIES_OPEN};
 use super::status::{
     OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason,
-    read_failed, reader_too_slow, status,
+    read_failed, status,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
@@ -70,11 +67,18 @@ pub struct Records {
     allow_import: bool,
     /// Signs records of which parts are left out.
     key: Option<Arc<SigningKey>>,
+    /// Cancelled when streams of many records must end.
+    closing: CancellationToken,
 }
 
 impl Records {
-    /// Creates the service for these games.
-    pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, config: &ServerConfig) -> Self {
+    /// Creates the service for these games; `closing` ends its streams of many records.
+    pub fn new(
+        recorded: Recorded,
+        tournaments: Arc<Tournaments>,
+        config: &ServerConfig,
+        closing: CancellationToken,
+    ) -> Self {
         let shares = recorded.rooms().shares();
         Self {
             recorded,
@@ -85,6 +89,7 @@ impl Records {
             import_pace: Arc::new(Pace::new(IMPORT_RATE)),
             allow_import: config.allow_import,
             key: config.signing_key.clone(),
+            closing,
         }
     }
 
@@ -106,7 +111,7 @@ impl Records {
         request: &v1::StreamRecordsRequest,
         filter: &v1::RecordFilter,
         (key, gateway): (Key, Option<&Gateway>),
-        sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
+        sender: &Sender<v1::StreamRecordsResponse>,
     ) -> Result<(), Status> {
         let mut after = 0;
         // The game after which the stream resumes, until it was found.
@@ -205,8 +210,6 @@ fn cannot_resume(game: &str) -> Status {
     )
 }
 
-type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
-
 impl RecordService for Records {
     type GetRecordStream = Responses<v1::GetRecordResponse>;
     type StreamRecordsStream = Responses<v1::StreamRecordsResponse>;
@@ -269,14 +272,14 @@ impl RecordService for Records {
         let key = self.key.clone();
         let shown = move |lines, view| seen(view, key.as_deref(), lines);
         let lines = self.recorded.of_game(&caller, &game_id, shown).await?;
-        let (sender, responses) = channel();
-        tokio::spawn(short("one call", async move {
-            let response = |lines| v1::GetRecordResponse { lines };
-            let sent = send(&sender, lines, response).await;
-            drop(place);
-            end(&sender, sent).await;
-        }));
-        Ok(Response::new(responses))
+        // One record is sent also while the server closes its streams.
+        let closing = CancellationToken::new();
+        let (response, sending) = follow::stream(closing, move |sender| async move {
+            let _place = place;
+            send(&sender, lines, |lines| v1::GetRecordResponse { lines }).await
+        });
+        tokio::spawn(short("one call", sending));
+        Ok(response)
     }
 
     async fn stream_records(
@@ -289,14 +292,13 @@ impl RecordService for Records {
         let mut request = request.into_inner();
         let filter = checked(request.filter.take())?;
         let service = self.clone();
-        let (sender, responses) = channel();
-        tokio::spawn(short("one call", async move {
+        let (response, sending) = follow::stream(self.closing.clone(), move |sender| async move {
             let charged = (key, gateway.as_ref());
             let sending = service.send_all(&caller, &request, &filter, charged, &sender);
-            let sent = sending.await;
-            end(&sender, sent).await;
-        }));
-        Ok(Response::new(responses))
+            sending.await
+        });
+        tokio::spawn(short("one call", sending));
+        Ok(response)
     }
 
     async fn import_record(
@@ -567,18 +569,12 @@ fn import_too_slow() -> Status {
     )
 }
 
-/// A channel for responses, and its stream for the transport.
-fn channel<T: Send + 'static>() -> (mpsc::Sender<Result<T, Status>>, Responses<T>) {
-    let (sender, receiver) = mpsc::channel(1);
-    (sender, Box::pin(ReceiverStream::new(receiver)))
-}
-
 /// Sends the lines of one record.
 ///
 /// # Errors
 /// The client has gone or is too slow.
 async fn send<T>(
-    sender: &mpsc::Sender<Result<T, Status>>,
+    sender: &Sender<T>,
     lines: Vec<v1::RecordLine>,
     response: impl Fn(Vec<v1::RecordLine>) -> T,
 ) -> Result<(), Status> {
@@ -590,10 +586,8 @@ async fn send<T>(
     Ok(())
 }
 
-async fn send_part<T>(sender: &mpsc::Sender<Result<T, Status>>, part: T) -> Result<(), Status> {
-    let sent = sender.send_timeout(Ok(part), RECORD_SEND_TIMEOUT);
-    sent.await
-        .map_err(|_| reader_too_slow("a record", RECORD_SEND_TIMEOUT))
+async fn send_part<T>(sender: &Sender<T>, part: T) -> Result<(), Status> {
+    follow::send_part(sender, part, "a record", RECORD_SEND_TIMEOUT).await
 }
 
 /// The next lines that fit one message.
@@ -610,7 +604,10 @@ fn next_part(lines: &mut Peekable<impl Iterator<Item = v1::RecordLine>>) -> Vec<
 
 #[cfg(test)]
 mod tests {
-    use futures::FutureExt as _;
+    use std::ops::RangeInclusive;
+
+    use futures::{FutureExt as _, StreamExt as _};
+    use tokio::sync::mpsc;
     use tokio_util::task::TaskTracker;
 
     use super::super::lookup::Lookup;
@@ -740,20 +737,65 @@ mod tests {
         assert_eq!(lists(&summary, &[]), Some(false));
     }
 
-    #[tokio::test]
-    async fn a_record_that_is_deleted_before_its_turn_ends_no_stream() {
-        let store = Arc::new(MemoryStore::default());
-        for game in 1..=3 {
+    fn records(store: &Arc<MemoryStore>) -> Records {
+        let (recorded, tournaments) = recorded(store);
+        let closing = CancellationToken::new();
+        Records::new(recorded, tournaments, &ServerConfig::default(), closing)
+    }
+
+    fn operator() -> Caller {
+        Caller {
+            role: Role::Admin,
+            ..Caller::default()
+        }
+    }
+
+    async fn import(store: &MemoryStore, games: RangeInclusive<u8>) {
+        for game in games {
             let lines = Arc::from([header(game)]);
             let imported = store.import(GameId::from_bytes([game; 16]), summary_of(game), lines);
             assert_eq!(imported.await, Ok(true));
         }
-        let (recorded, tournaments) = recorded(&store);
-        let records = Records::new(recorded, tournaments, &ServerConfig::default());
-        let caller = Caller {
-            role: Role::Admin,
-            ..Caller::default()
+    }
+
+    #[tokio::test]
+    async fn a_stream_ends_with_its_client_and_when_the_server_closes_its_streams() {
+        let store = Arc::new(MemoryStore::default());
+        import(&store, 1..=1).await;
+        let records = records(&store);
+        // Its record waits for its turn.
+        let _all = records
+            .sending
+            .take_many_anyway(Key::Local, MAX_RECORDS_SENT);
+        let begin = async || {
+            let mut request = Request::new(v1::StreamRecordsRequest::default());
+            request.extensions_mut().insert(operator());
+            let begun = records.stream_records(request).await;
+            tokio::task::yield_now().await;
+            begun.expect("allowed").into_inner()
         };
+        let tasks = || {
+            tokio::runtime::Handle::current()
+                .metrics()
+                .num_alive_tasks()
+        };
+        let before = tasks();
+        let stream = begin().await;
+        assert_eq!(tasks(), before + 1);
+        drop(stream);
+        tokio::task::yield_now().await;
+        assert_eq!(tasks(), before, "nobody receives it");
+        let mut stream = begin().await;
+        records.closing.cancel();
+        let ended = stream.next().await.expect("the reason");
+        assert!(has_reason(&ended.expect_err("the end"), "SHUTTING_DOWN"));
+    }
+
+    #[tokio::test]
+    async fn a_record_that_is_deleted_before_its_turn_ends_no_stream() {
+        let store = Arc::new(MemoryStore::default());
+        import(&store, 1..=3).await;
+        let (records, caller) = (records(&store), operator());
         let (request, filter) = (
             v1::StreamRecordsRequest::default(),
             v1::RecordFilter::default(),

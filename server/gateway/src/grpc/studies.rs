@@ -5,7 +5,6 @@ mod participation;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
-use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{
@@ -13,25 +12,22 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::convert::FieldProblem;
 use chefshat_study::{NewParticipants, Refusal as StudyRefusal, SettingsProblem};
-use futures::Stream;
 use prost::Message as _;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
-use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::follow::{self, send};
+use super::follow::{self, Responses, Sender, send};
 use super::forward::Gateway;
 use super::limits::{charged, make_way};
 use super::lists;
 use super::lookup::Lookup;
 use super::status::{
-    Refusal, field, internal, not_created, read_failed, reader_too_slow, request_id, shutting_down,
-    status,
+    Refusal, field, internal, not_created, read_failed, request_id, shutting_down, status,
 };
 use chefshat_admission::access::{Caller, Role};
-use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_hosting::cluster::FoundBy;
@@ -49,8 +45,6 @@ use chefshat_wire::convert;
 
 /// Participants of a study about all of whom a request costs its caller one call more.
 const PARTICIPANTS_PER_CALL: usize = 100;
-
-type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 /// The services of studies.
 #[derive(Debug, Clone)]
@@ -315,26 +309,18 @@ impl StudyService for StudyCalls {
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
-        let place = self.followers.try_take(key).ok_or_else(|| {
-            Refusal::from(Refused {
-                reason: "TOO_MANY_FOLLOWERS",
-                what: "too many streams that follow studies",
-                limit: self.followers.share_of(key) as u64,
-                retry_after: FOLLOW_SEND_TIMEOUT,
-            })
-        })?;
+        let what = "too many streams that follow studies";
+        let place = follow::place(&self.followers, key, what)?;
         self.charge_all(&handle, key);
-        let (sender, responses) = mpsc::channel(1);
         let studies = Arc::clone(&self.studies);
         let counted = studies.rooms().metrics().stream(StreamKind::Follow);
-        let to = sender.clone();
-        let following = async move {
-            let _held = (place, counted);
-            follow(&handle, &studies, key, &to).await
-        };
-        let following = follow::run(self.closing.clone(), sender, following);
+        let (response, following) =
+            follow::stream(self.closing.clone(), move |sender| async move {
+                let _held = (place, counted);
+                follow(&handle, &studies, key, &sender).await
+            });
         tokio::spawn(named(LongTask::FollowStudy, following));
-        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+        Ok(response)
     }
 
     async fn remove_study_participant(
@@ -381,40 +367,35 @@ impl StudyService for StudyCalls {
             .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let place = self.exports.take(key).await;
-        let (sender, responses) = mpsc::channel(1);
         let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
         let studies = Arc::clone(&self.studies);
-        let to = sender.clone();
-        let exporting = async move {
-            let _place = place;
-            let forwarding = async move {
-                while let Some(part) = exported.recv().await {
-                    let response = v1::ExportStudyResponse {
-                        file: part.file,
-                        data: part.data,
-                    };
-                    // If it is not received, what gathers the export notices that this has ended.
-                    let sent = to.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
-                    sent.await
-                        .map_err(|_| reader_too_slow("the export", FOLLOW_SEND_TIMEOUT))?;
+        let (response, exporting) =
+            follow::stream(self.closing.clone(), move |sender| async move {
+                let _place = place;
+                let forwarding = async move {
+                    while let Some(part) = exported.recv().await {
+                        let response = v1::ExportStudyResponse {
+                            file: part.file,
+                            data: part.data,
+                        };
+                        // If it is not received, what gathers the export notices that this has ended.
+                        let (what, limit) = ("the export", FOLLOW_SEND_TIMEOUT);
+                        follow::send_part(&sender, response, what, limit).await?;
+                    }
+                    Ok(())
+                };
+                let gathering = async move {
+                    let gathered = handle.export(studies.rooms(), request.test, &files).await;
+                    drop(files);
+                    gathered
+                };
+                match tokio::join!(forwarding, gathering) {
+                    (_, Err(ExportError::Store(error))) => Err(read_failed(error)),
+                    (forwarded, _) => forwarded,
                 }
-                Ok(())
-            };
-            let gathering = async move {
-                let gathered = handle.export(studies.rooms(), request.test, &files).await;
-                drop(files);
-                gathered
-            };
-            match tokio::join!(forwarding, gathering) {
-                (_, Err(ExportError::Store(error))) => Err(read_failed(error)),
-                (forwarded, _) => forwarded,
-            }
-        };
-        tokio::spawn(short(
-            "one export",
-            follow::run(self.closing.clone(), sender, exporting),
-        ));
-        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+            });
+        tokio::spawn(short("one export", exporting));
+        Ok(response)
     }
 
     async fn delete_study_participant(
@@ -480,7 +461,7 @@ async fn follow(
     handle: &Arc<StudyHandle>,
     studies: &Studies,
     key: Key,
-    sender: &mpsc::Sender<Result<v1::FollowStudyResponse, Status>>,
+    sender: &Sender<v1::FollowStudyResponse>,
 ) -> Result<(), Status> {
     let response = |study, participants| v1::FollowStudyResponse {
         study,
@@ -518,7 +499,7 @@ async fn follow(
             return Ok(());
         }
         sleep_until(began + FOLLOW_INTERVAL).await;
-        follow::changed(&mut changes, handle.stopped(), sender).await?;
+        follow::changed(&mut changes, handle.stopped()).await?;
     }
 }
 

@@ -3,7 +3,6 @@
 
 mod by_hand;
 
-use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{
@@ -12,16 +11,14 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{BeginProblem, JoinProblem, SettingsProblem, State};
-use futures::Stream;
 use prost::Message as _;
-use tokio::sync::{Semaphore, mpsc};
-use tokio_stream::wrappers::ReceiverStream;
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
 use super::access::check;
-use super::follow::{self, compute_failed, follow};
+use super::follow::{self, Responses, compute_failed, follow};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists::{self, Listing, Page, Part};
@@ -33,12 +30,11 @@ use super::status::{
     status,
 };
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{
-    FOLLOW_SEND_TIMEOUT, MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE,
-    MAX_LEADERBOARD_LINES,
+    MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
 };
 use chefshat_hosting::tournaments::{
     BeginRefusal, CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem,
@@ -216,8 +212,7 @@ impl Listing for TournamentList<'_> {
 }
 
 impl TournamentService for TournamentCalls {
-    type FollowTournamentStream =
-        Pin<Box<dyn Stream<Item = Result<v1::FollowTournamentResponse, Status>> + Send>>;
+    type FollowTournamentStream = Responses<v1::FollowTournamentResponse>;
 
     async fn create_tournament(
         &self,
@@ -492,25 +487,17 @@ impl TournamentService for TournamentCalls {
         let handle = self
             .find(&caller, &request.into_inner().tournament_id)
             .await?;
-        let place = self.followers.try_take(key).ok_or_else(|| {
-            Refusal::from(Refused {
-                reason: "TOO_MANY_FOLLOWERS",
-                what: "too many streams that follow tournaments",
-                limit: self.followers.share_of(key) as u64,
-                retry_after: FOLLOW_SEND_TIMEOUT,
-            })
-        })?;
-        let (sender, responses) = mpsc::channel(1);
+        let what = "too many streams that follow tournaments";
+        let place = follow::place(&self.followers, key, what)?;
         let permits = Arc::clone(&self.update_permits);
         let counted = self.recorded.rooms().metrics().stream(StreamKind::Follow);
-        let to = sender.clone();
-        let following = async move {
-            let _held = (place, counted);
-            follow(&handle, &permits, &to).await
-        };
-        let following = follow::run(self.closing.clone(), sender, following);
+        let (response, following) =
+            follow::stream(self.closing.clone(), move |sender| async move {
+                let _held = (place, counted);
+                follow(&handle, &permits, &sender).await
+            });
         tokio::spawn(named(LongTask::FollowTournament, following));
-        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+        Ok(response)
     }
 
     async fn get_tournament_results(

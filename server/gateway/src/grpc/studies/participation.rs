@@ -11,15 +11,13 @@ use chefshat_study::{
 };
 use prost::Message as _;
 use sha2::{Digest as _, Sha256};
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
-use super::{Responses, StudyCalls, code_of, not_done, refused};
-use crate::grpc::follow::{self, changed};
+use super::{StudyCalls, code_of, not_done, refused};
+use crate::grpc::follow::{self, Responses, Sender, changed};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
-use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key, Refused};
+use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
@@ -244,31 +242,18 @@ impl ParticipationService for StudyCalls {
     ) -> Result<Response<Self::FollowParticipationStream>, Status> {
         let key = charged(request.extensions());
         let (handle, number, session) = self.of_session(&request.into_inner().session, key).await?;
-        let place = self.participants.try_take(key).ok_or_else(|| {
-            Refusal::from(Refused {
-                reason: "TOO_MANY_FOLLOWERS",
-                what: "too many streams of participants",
-                limit: self.participants.share_of(key) as u64,
-                retry_after: FOLLOW_SEND_TIMEOUT,
-            })
-        })?;
-        let (sender, responses) = mpsc::channel(1);
+        let what = "too many streams of participants";
+        let place = follow::place(&self.participants, key, what)?;
         let rooms = Arc::clone(self.studies.rooms());
         let counted = rooms.metrics().stream(StreamKind::Follow);
-        let to = sender.clone();
-        let following = async move {
-            let _held = (place, counted);
-            let _presence = handle.present(number, session).await;
-            let following = follow(&handle, &rooms, number, session, &to);
-            // A client that goes is absent at once.
-            tokio::select! {
-                followed = following => followed,
-                () = to.closed() => Ok(()),
-            }
-        };
-        let following = follow::run(self.closing.clone(), sender, following);
+        let (response, following) =
+            follow::stream(self.closing.clone(), move |sender| async move {
+                let _held = (place, counted);
+                let _presence = handle.present(number, session).await;
+                follow(&handle, &rooms, number, session, &sender).await
+            });
         tokio::spawn(named(LongTask::Participation, following));
-        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+        Ok(response)
     }
 
     async fn give_consent(
@@ -386,7 +371,7 @@ async fn follow(
     rooms: &Rooms,
     number: u32,
     session: u32,
-    sender: &mpsc::Sender<Result<v1::FollowParticipationResponse, Status>>,
+    sender: &Sender<v1::FollowParticipationResponse>,
 ) -> Result<(), Status> {
     let mut changes = handle.view_changes(number);
     let mut sent = None;
@@ -404,12 +389,12 @@ async fn follow(
         if ended {
             return Ok(());
         }
-        changed(&mut changes, handle.stopped(), sender).await?;
+        changed(&mut changes, handle.stopped()).await?;
     }
 }
 
 async fn send(
-    sender: &mpsc::Sender<Result<v1::FollowParticipationResponse, Status>>,
+    sender: &Sender<v1::FollowParticipationResponse>,
     view: v1::StudyView,
 ) -> Result<(), Status> {
     let message = Ok(v1::FollowParticipationResponse { view: Some(view) });
