@@ -36,7 +36,7 @@ use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::cluster::Directory;
 use chefshat_hosting::config::MAX_SEATS_PER_WATCH;
-use chefshat_hosting::room::{Loss, SeatAction};
+use chefshat_hosting::room::SeatAction;
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::Tournaments;
 use chefshat_room::ids::{Id, RoomToken};
@@ -252,12 +252,7 @@ impl PlayService for Play {
             loop {
                 tokio::select! {
                     () = outbox.abandoned() => break,
-                    () = closing.cancelled() => {
-                        reader.announce_stop();
-                        reader.loss = Loss::WithNode;
-                        outbox.end(StreamEnd::Complete);
-                        break;
-                    }
+                    () = closing.cancelled() => break,
                     own = poll_fn(|context| reader.poll_own(context)) => {
                         reader.do_own(own).await;
                         if !reader.has_attached() {
@@ -266,7 +261,8 @@ impl PlayService for Play {
                     }
                 }
             }
-            reader.leave_all().await;
+            reader.leave_at_end(&closing).await;
+            outbox.end(StreamEnd::Complete);
         }));
         Ok(Response::new(Box::pin(updates.map_err(stream_ended))))
     }

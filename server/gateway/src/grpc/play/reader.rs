@@ -256,13 +256,7 @@ impl Reader {
                 Err(status) => break Err(status),
             }
         };
-        if closing.is_cancelled() {
-            self.announce_stop();
-            self.loss = Loss::WithNode;
-        } else if self.remote.as_ref().is_some_and(|it| it.has_lost_a_node()) {
-            self.loss = Loss::WithNode;
-        }
-        Box::pin(self.leave_all()).await;
+        Box::pin(self.leave_at_end(&closing)).await;
         self.outbox.end(match end {
             Ok(()) => StreamEnd::Complete,
             Err(status) => {
@@ -398,7 +392,15 @@ impl Reader {
         }
     }
 
-    pub(super) async fn leave_all(&mut self) {
+    /// Leaves all seats at the end of the stream, which says nothing of the client if the server closes
+    /// its streams (`closing`) or another node was lost.
+    pub(super) async fn leave_at_end(&mut self, closing: &CancellationToken) {
+        if closing.is_cancelled() {
+            self.announce_stop();
+            self.loss = Loss::WithNode;
+        } else if self.remote.as_ref().is_some_and(|it| it.has_lost_a_node()) {
+            self.loss = Loss::WithNode;
+        }
         let loss = self.loss;
         for bound in std::mem::take(&mut self.participants).into_values() {
             bound.leave().await;
@@ -413,7 +415,7 @@ impl Reader {
     }
 
     /// Tells the participants of tournaments that the server stops. Rooms tell their seats.
-    pub(super) fn announce_stop(&self) {
+    fn announce_stop(&self) {
         for handle in self.participants.keys() {
             self.detached(*handle, v1::DetachReason::ServerStopping);
         }
@@ -511,14 +513,18 @@ mod tests {
         )
     }
 
-    /// Executes commands for a seat that there is not: each is refused.
-    async fn flood(reader: &mut Reader, commands: usize) {
-        for _ in 0..commands {
-            let command = v1::SeatCommand {
-                handle: 7,
-                command: Some(Command::Answer(v1::Answer::default())),
-            };
-            let commands = vec![command];
+    /// A command for a seat that there is not: it is refused.
+    fn answer() -> Option<v1::SeatCommand> {
+        Some(v1::SeatCommand {
+            handle: 7,
+            command: Some(Command::Answer(v1::Answer::default())),
+        })
+    }
+
+    /// Executes messages with this command, or without any.
+    async fn flood(reader: &mut Reader, command: Option<v1::SeatCommand>, messages: usize) {
+        for _ in 0..messages {
+            let commands = command.clone().into_iter().collect();
             let request = v1::PlayRequest { commands };
             let executed = request.execute(reader, Instant::now());
             executed.await.expect("few commands");
@@ -526,23 +532,26 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_flood_of_commands_yields_to_other_tasks() {
-        let (outbox, _updates) = Outbox::new();
-        let mut reader = reader(&outbox);
-        let flooding = tokio::spawn(async move { flood(&mut reader, 10_000).await });
-        // The only thread runs the flood until it yields.
-        tokio::task::yield_now().await;
-        assert!(!flooding.is_finished());
-        flooding.abort();
+    async fn a_flood_of_messages_yields_to_other_tasks() {
+        for command in [answer(), None] {
+            let (outbox, _updates) = Outbox::new();
+            let mut reader = reader(&outbox);
+            let flooding = async move { flood(&mut reader, command, 10_000).await };
+            let flooding = tokio::spawn(flooding);
+            // The only thread runs the flood until it yields.
+            tokio::task::yield_now().await;
+            assert!(!flooding.is_finished());
+            flooding.abort();
+        }
     }
 
     #[tokio::test]
     async fn a_stream_whose_replies_are_not_read_ends() {
         let (outbox, updates) = Outbox::new();
         let mut reader = reader(&outbox);
-        flood(&mut reader, OUTBOX_CAPACITY).await;
+        flood(&mut reader, answer(), OUTBOX_CAPACITY).await;
         assert!(outbox.is_open());
-        flood(&mut reader, 1).await;
+        flood(&mut reader, answer(), 1).await;
         let ends = updates.filter_map(async |it| it.err());
         let ends: Vec<StreamEnd> = ends.collect().await;
         assert_eq!(ends, [StreamEnd::UpdatesNotTaken]);

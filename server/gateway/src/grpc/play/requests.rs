@@ -17,6 +17,8 @@ use chefshat_wire::encoded::peer::{HandedOver, PlayInput, PlayRequest, play_inpu
 
 impl Requests for v1::PlayRequest {
     async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {
+        // A flood of messages without commands, too, must not hold the thread.
+        tokio::task::consume_budget().await;
         if self.commands.len() > MAX_COMMANDS_PER_MESSAGE {
             return Err(status(
                 Code::InvalidArgument,
