@@ -25,6 +25,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
 use super::deadline::deadline;
+use super::limits::make_way;
 use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
@@ -198,6 +199,8 @@ impl AnalysisService for Analyses {
         request: Request<v1::LegalActionsRequest>,
     ) -> Result<Response<v1::LegalActionsResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        // Few records are read at a time.
+        make_way(request.extensions());
         let moment = request.into_inner().moment;
         let moment = moment.ok_or_else(|| refused("moment", "not set"))?;
         let read = |branch: Branch| {

@@ -366,6 +366,35 @@ impl HttpBody for KeptBody {
     }
 }
 
+/// A caller that has as many calls as may be executed at a time.
+#[cfg(test)]
+pub(super) struct FullShare {
+    limits: CallLimits,
+    _others: Vec<Admitted>,
+}
+
+#[cfg(test)]
+impl FullShare {
+    /// With this call among them.
+    pub(super) fn with<T>(request: &mut tonic::Request<T>) -> Self {
+        let limits = CallLimits::new(chefshat_admission::limits::Shares::default());
+        let admitted = limits.admit_now(Key::Local, false, 1).expect("the first");
+        let executing = admitted.executing().expect("its place").clone();
+        request.extensions_mut().insert(executing);
+        let others = std::iter::from_fn(|| limits.admit_now(Key::Local, false, 1));
+        let others = std::iter::once(admitted).chain(others).collect();
+        Self {
+            limits,
+            _others: others,
+        }
+    }
+
+    /// Whether another one may be executed.
+    pub(super) fn has_place(&self) -> bool {
+        self.limits.admit_now(Key::Local, false, 1).is_some()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::convert::Infallible;

@@ -23,8 +23,6 @@ mod pool;
 mod recorded;
 mod records;
 mod refusals;
-#[cfg(test)]
-mod repeated_tests;
 mod room_service;
 mod spectate;
 pub mod status;
@@ -32,6 +30,8 @@ mod studies;
 mod table;
 mod takeover;
 mod tournaments;
+#[cfg(test)]
+mod unit_tests;
 mod vector;
 
 pub use access::{AccessLayer, until_closing};

@@ -376,7 +376,7 @@ mod tests {
     use tokio_util::task::TaskTracker;
 
     use super::*;
-    use chefshat_admission::limits::{CallLimits, Key, Shares};
+    use crate::grpc::limits::FullShare;
     use chefshat_hosting::config::ServerConfig;
     use chefshat_hosting::rooms::NewRoom;
     use chefshat_store::MemoryStore;
@@ -394,15 +394,10 @@ mod tests {
             ticket: RoomToken::random(room).to_text(),
             command: Some(command),
         });
-        let limits = CallLimits::new(Shares::default());
-        let admitted = limits.admit_now(Key::Local, false, 1).expect("the first");
-        let executing = admitted.executing().expect("its place").clone();
-        request.extensions_mut().insert(executing);
-        let _others: Vec<_> =
-            std::iter::from_fn(|| limits.admit_now(Key::Local, false, 1)).collect();
+        let share = FullShare::with(&mut request);
         // The room runs on the same thread, and does not until this test waits.
         assert!(futures::poll!(Box::pin(play.act(request))).is_pending());
-        limits.admit_now(Key::Local, false, 1).is_some()
+        share.has_place()
     }
 
     #[tokio::test]

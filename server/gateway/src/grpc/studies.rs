@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 
+use chefshat_proto::codec::{LARGE, beside_tasks};
 use chefshat_proto::v1::{
     self, study_service_client::StudyServiceClient, study_service_server::StudyService,
 };
@@ -32,8 +33,8 @@ use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_hosting::cluster::FoundBy;
 use chefshat_hosting::config::{
-    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_RECORDS_SENT, MAX_STUDY_ADDED,
-    MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
+    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_PEER_MESSAGE_BYTES, MAX_RECORDS_SENT,
+    MAX_STUDY_ADDED, MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
 };
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
@@ -88,7 +89,8 @@ impl StudyCalls {
             .charge(key, (participants / PARTICIPANTS_PER_CALL) as u64);
     }
 
-    /// Answers with something about all participants of a study, in turn among long computations.
+    /// Answers with something about all participants of a study, in turn among long computations. The
+    /// call holds up no others while it waits: its handler has made way.
     async fn about_all<T: Send + 'static>(
         &self,
         handle: Arc<StudyHandle>,
@@ -154,7 +156,7 @@ impl StudyService for StudyCalls {
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
         // Levels are a map: their order differs between encodings of the same settings.
-        let content = content_of(&settings);
+        let content = beside_tasks(settings.encoded_len(), || content_of(&settings));
         let request_key =
             request_id(&request.request_id, &caller)?.map(|id| RequestKey::new(id, &content));
         let known = match request_key {
@@ -187,6 +189,7 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::GetStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        make_way(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
@@ -222,11 +225,14 @@ impl StudyService for StudyCalls {
             .into_iter()
             .map(|(_, handle)| handle)
             .filter(|handle| is_operator || tokens.iter().any(|token| handle.is_owner(token)));
-        let mut studies: Vec<v1::Study> = studies.map(|handle| handle.describe()).collect();
+        // Their settings are large together.
+        let described = || studies.map(|handle| handle.describe()).collect();
+        let mut studies: Vec<v1::Study> = beside_tasks(LARGE, described);
         if let Some(gateway) = gateway {
             let ask = |channel| {
-                let (mut service, request) = (StudyServiceClient::new(channel), request.clone());
-                let request = gateway.request(request);
+                let service = StudyServiceClient::new(channel);
+                let mut service = service.max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
+                let request = gateway.request(request.clone());
                 async move { service.list_studies(request).await }
             };
             let others = lists::of_others(&gateway, ask).await;
@@ -280,6 +286,7 @@ impl StudyService for StudyCalls {
         use chefshat_study::Status::{Active, DroppedOut, Invited};
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        make_way(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
@@ -474,15 +481,15 @@ async fn follow(
     loop {
         changes.mark_unchanged();
         let over = handle.is_complete();
-        let study = handle.describe();
         let (followed, rooms) = (Arc::clone(handle), Arc::clone(studies.rooms()));
         let slice = background.slice(key).await;
         let making = background.run(move || {
+            let study = followed.describe();
             let changed = changed_participants(&followed, &rooms, &mut sent);
-            (changed, sent)
+            (study, changed, sent)
         });
-        let changed;
-        (changed, sent) = making.await.ok_or_else(internal)?;
+        let (study, changed);
+        (study, changed, sent) = making.await.ok_or_else(internal)?;
         drop(slice);
         let study = (sent_study.as_ref() != Some(&study)).then_some(study);
         let began = Instant::now();

@@ -20,7 +20,7 @@ use tonic::{Code, Request, Response, Status};
 use super::access::check;
 use super::follow::{self, Responses, compute_failed, follow};
 use super::forward::Gateway;
-use super::limits::charged;
+use super::limits::{charged, make_way};
 use super::lists::{self, Listing, Page, Part};
 use super::new_room::{supported_policy, too_long};
 use super::pages;
@@ -505,6 +505,7 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        make_way(request.extensions());
         let handle = self
             .find(&caller, &request.into_inner().tournament_id)
             .await?;
@@ -544,6 +545,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetLeaderboardRequest>,
     ) -> Result<Response<v1::GetLeaderboardResponse>, Status> {
+        make_way(request.extensions());
         let request = request.into_inner();
         convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?;

@@ -1,5 +1,6 @@
-//! Repeated requests, whose answers contain secrets: the caller gets the same answer again, and
-//! another token with the same `request_id` does not get these secrets.
+//! Calls about tournaments and studies, without a server around them. Repeated requests, whose answers
+//! contain secrets: the caller gets the same answer again, and another token with the same `request_id`
+//! does not get these secrets. Calls that wait.
 
 use std::sync::Arc;
 
@@ -12,9 +13,12 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tonic::Request;
 
+use futures::FutureExt as _;
+
+use super::limits::FullShare;
 use super::{Lookup, Recorded, StudyCalls, TournamentCalls};
 use chefshat_admission::access::{Caller, Role};
-use chefshat_admission::limits::CallLimits;
+use chefshat_admission::limits::{CallLimits, Key};
 use chefshat_hosting::config::ServerConfig;
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::Studies;
@@ -24,7 +28,13 @@ use chefshat_store::MemoryStore;
 const REQUEST_ID: [u8; 32] = [7; 32];
 
 /// The calls of a server.
-fn calls() -> (TournamentCalls, StudyCalls) {
+struct Calls {
+    rooms: Arc<Rooms>,
+    tournaments: TournamentCalls,
+    studies: StudyCalls,
+}
+
+fn calls() -> Calls {
     let config = ServerConfig::default();
     let tracker = TaskTracker::new();
     let store = Arc::new(MemoryStore::default());
@@ -32,13 +42,15 @@ fn calls() -> (TournamentCalls, StudyCalls) {
     let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
     let studies = Studies::new(Arc::clone(&rooms), tracker);
     let limits = Arc::new(CallLimits::new(config.shares));
-    let lookup = Lookup::new(rooms, Arc::clone(&tournaments));
+    let lookup = Lookup::new(Arc::clone(&rooms), Arc::clone(&tournaments));
     let recorded = Recorded::new(lookup.clone(), Role::Spectator).expect("threads");
     let closing = CancellationToken::new();
-    (
-        TournamentCalls::new(tournaments, recorded, Arc::clone(&limits), closing.clone()),
-        StudyCalls::new(studies, lookup, limits, closing),
-    )
+    let calls = Arc::clone(&limits);
+    Calls {
+        rooms,
+        tournaments: TournamentCalls::new(tournaments, recorded, calls, closing.clone()),
+        studies: StudyCalls::new(studies, lookup, limits, closing),
+    }
 }
 
 /// A request of a token of this role.
@@ -52,14 +64,13 @@ fn by<T>(token: &str, message: T) -> Request<T> {
     request
 }
 
-#[tokio::test]
-async fn another_token_does_not_get_the_secret_of_a_study() {
-    let (_, studies) = calls();
+/// Creates a study for one participant.
+fn create() -> v1::CreateStudyRequest {
     let seat = v1::SeatConfig {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
         ..v1::SeatConfig::default()
     };
-    let create = v1::CreateStudyRequest {
+    v1::CreateStudyRequest {
         settings: Some(v1::StudySettings {
             name: "study".into(),
             title: "A game of cards".into(),
@@ -76,9 +87,14 @@ async fn another_token_does_not_get_the_secret_of_a_study() {
             ..v1::StudySettings::default()
         }),
         request_id: REQUEST_ID.to_vec(),
-    };
+    }
+}
+
+#[tokio::test]
+async fn another_token_does_not_get_the_secret_of_a_study() {
+    let Calls { studies, .. } = calls();
     let created = async |token| {
-        let created = studies.create_study(by(token, create.clone())).await;
+        let created = studies.create_study(by(token, create())).await;
         created.expect("a study").into_inner().owner_token
     };
     let owner = created("first").await;
@@ -87,8 +103,28 @@ async fn another_token_does_not_get_the_secret_of_a_study() {
 }
 
 #[tokio::test]
+async fn who_waits_for_something_about_all_participants_of_a_study_holds_up_no_other_calls() {
+    let Calls { rooms, studies, .. } = calls();
+    let created = studies.create_study(by("first", create())).await;
+    let created = created.expect("a study").into_inner();
+    // Games of built-in agents have all threads.
+    let slice = || rooms.background().slice(Key::Local).now_or_never();
+    let _games: Vec<_> = std::iter::from_fn(slice).collect();
+    let mut request = by(
+        "first",
+        v1::GetStudyRequest {
+            study_id: created.study.expect("a study").study_id,
+            owner_token: created.owner_token,
+        },
+    );
+    let share = FullShare::with(&mut request);
+    assert!(studies.get_study(request).now_or_never().is_none());
+    assert!(share.has_place());
+}
+
+#[tokio::test]
 async fn another_token_does_not_get_the_ticket_of_who_is_added_by_hand() {
-    let (tournaments, _) = calls();
+    let Calls { tournaments, .. } = calls();
     let cup = v1::CreateTournamentRequest {
         settings: Some(v1::TournamentSettings {
             name: "Cup".into(),
