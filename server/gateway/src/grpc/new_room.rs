@@ -93,14 +93,16 @@ pub(super) async fn new_room(
             ));
         }
     }
+    let display_names = convert::display_names_from_proto(&request.seats).map_err(refused)?;
     Ok(NewRoom {
         name,
+        // Last: no record is read for a request that is refused.
         recorded: recorded_players((recorded, caller, gateway), &fills).await?,
         rules: beginning.rules,
         policy,
         fills,
         wizards: convert::wizards_from_proto(&request.seats),
-        display_names: convert::display_names_from_proto(&request.seats).map_err(refused)?,
+        display_names,
         start: beginning.start,
         game_seed: beginning.game_seed,
         physical: request.physical,
