@@ -61,15 +61,19 @@ fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
 }
 
 /// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
-/// ignores so many refusals is disconnected.
+/// ignores so many refusals is disconnected. `client`: `None` behind a proxy.
 fn too_many_waiting(client: Option<&Arc<Client>>) -> Status {
-    if let Some(client) = client {
-        client.close();
-    }
+    let message = match client {
+        Some(client) => {
+            client.close();
+            "too many calls wait; the connection is closed"
+        }
+        None => "too many calls wait; make fewer at a time",
+    };
     status(
         Code::ResourceExhausted,
         "TOO_MANY_WAITING_CALLS",
-        "too many calls wait; the connection is closed",
+        message,
         [],
     )
 }
