@@ -265,8 +265,8 @@ fn title(lines: &[v1::RecordLine]) -> Option<Title> {
     })
 }
 
-/// The document with the tags of a game. `origin`: where this server is reached, which has no
-/// characters that HTML escapes. `has_picture`: whether there is a picture of it.
+/// The document with the tags of a game. `origin`: where this server is reached. `has_picture`:
+/// whether there is a picture of it.
 pub(super) fn document(
     document: &[u8],
     game: GameId,
@@ -280,7 +280,7 @@ pub(super) fn document(
         "" => "A game of Chef’s Hat",
         room => room,
     };
-    let (room, result) = (escaped(room), escaped(&title.result));
+    let (room, result, origin) = (escaped(room), escaped(&title.result), escaped(origin));
     let mut tags = format!(
         r#"
     <meta property="og:site_name" content="Chef’s Hat" />
@@ -356,7 +356,7 @@ async fn painted(mut child: Child, record: Vec<u8>) -> Option<Bytes> {
     child.wait().await.ok()?.success().then(|| picture.into())
 }
 
-/// Where a client reaches this server; `None` if it does not say. Has no characters that HTML escapes.
+/// Where a client reaches this server; `None` if it does not say.
 pub(super) fn origin<B>(request: &Request<B>, tls: bool) -> Option<String> {
     let named = || {
         let host = request.headers().get(header::HOST)?;
@@ -456,6 +456,11 @@ mod tests {
         assert!(made.starts_with("<html><head><title>t</title>\n"), "{made}");
         assert!(made.ends_with("</head><body></body></html>"), "{made}");
         let picture = format!("content=\"https://chef.example.org/replay/{GAME}.png\"");
+        let odd = tagged(page, &lines, "https://a&lt.example");
+        assert!(
+            odd.contains("content=\"https://a&amp;lt.example/replay/"),
+            "{odd}"
+        );
         for part in [
             "Friday &lt;evening&gt;",
             "1. &quot;&gt;&lt;script&gt; (12 points) · 2. Gustav (3 points)",
