@@ -40,7 +40,7 @@ use crate::config::{
     longest_shutdown,
 };
 use crate::connections::{self, Client, Connection, Connections, Limits, Listener};
-use crate::forwarded::ForwardedLayer;
+use crate::forwarded::note_clients;
 use crate::grpc;
 use crate::handshakes::Handshakes;
 use crate::limits::frames::MAX_HEADER_BYTES;
@@ -439,7 +439,7 @@ impl Server {
                         .http2_max_pending_accept_reset_streams(Some(MAX_RESET_STREAMS))
                         .http2_max_local_error_reset_streams(None)
                         .layer(MapRequestLayer::new(from_peer))
-                        .layer(ForwardedLayer::new(TrustedProxies::new([
+                        .layer(note_clients(TrustedProxies::new([
                             TrustedProxy::UnixSocket,
                         ])))
                         .layer(grpc::count_refusals(rooms.metrics()))
@@ -472,7 +472,7 @@ impl Server {
             .initial_stream_window_size(CLIENT_STREAM_WINDOW)
             .initial_connection_window_size(CLIENT_CONNECTION_WINDOW)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
-            .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
+            .layer(note_clients(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins, Arc::clone(&calls)))
             .layer(cors)
             .layer(PageLayer::new(

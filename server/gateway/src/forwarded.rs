@@ -2,64 +2,23 @@
 //! trusted proxy names in `x-forwarded-for`; [`peer_address`] then gives that client's address
 //! instead of the proxy's. What others write there counts for nothing.
 
-use std::task::{Context, Poll};
-
 use http::Request;
-use tower::{Layer, Service};
+use tower::util::MapRequestLayer;
 
 use crate::connections::{ForwardedClient, peer_address};
 use chefshat_base::proxies::TrustedProxies;
 
-/// Notes the clients of trusted proxies.
-#[derive(Debug, Clone)]
-pub struct ForwardedLayer {
+/// Notes the clients that these proxies name.
+pub fn note_clients<B>(
     trusted: TrustedProxies,
-}
-
-impl ForwardedLayer {
-    /// Believes these proxies.
-    pub fn new(trusted: TrustedProxies) -> Self {
-        Self { trusted }
-    }
-}
-
-impl<S> Layer<S> for ForwardedLayer {
-    type Service = WithClient<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithClient {
-            trusted: self.trusted.clone(),
-            services,
-        }
-    }
-}
-
-/// The services with the layer in front of them.
-#[derive(Debug, Clone)]
-pub struct WithClient<S> {
-    trusted: TrustedProxies,
-    services: S,
-}
-
-impl<S, B> Service<Request<B>> for WithClient<S>
-where
-    S: Service<Request<B>>,
-{
-    type Response = S::Response;
-    type Error = S::Error;
-    type Future = S::Future;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, mut request: Request<B>) -> Self::Future {
-        let by_proxy = (self.trusted).contains(peer_address(request.extensions()));
-        if by_proxy && let Some(client) = self.trusted.client(request.headers()) {
+) -> MapRequestLayer<impl Fn(Request<B>) -> Request<B> + Clone + Send> {
+    MapRequestLayer::new(move |mut request: Request<B>| {
+        let by_proxy = trusted.contains(peer_address(request.extensions()));
+        if by_proxy && let Some(client) = trusted.client(request.headers()) {
             request.extensions_mut().insert(ForwardedClient(client));
         }
-        self.services.call(request)
-    }
+        request
+    })
 }
 
 #[cfg(test)]
@@ -69,7 +28,7 @@ mod tests {
 
     use futures::FutureExt as _;
     use tonic::transport::server::TcpConnectInfo;
-    use tower::{ServiceBuilder, service_fn};
+    use tower::{Service as _, ServiceBuilder, service_fn};
 
     use super::*;
     use chefshat_base::proxies::{FORWARDED_FOR, TrustedProxy};
@@ -78,7 +37,7 @@ mod tests {
     /// these headers.
     fn seen(trusted: &[&str], peer: &str, headers: &[&str]) -> String {
         let trusted = trusted.iter().map(|text| text.parse().expect("a proxy"));
-        let layer = ForwardedLayer::new(TrustedProxies::new(trusted));
+        let layer = note_clients(TrustedProxies::new(trusted));
         let mut services = ServiceBuilder::new().layer(layer).service(service_fn(
             |request: Request<()>| async move {
                 Ok::<_, Infallible>(peer_address(request.extensions()))
