@@ -1,5 +1,5 @@
 //! `TournamentService`: checks requests, forwards them to the tournament, and converts the results.
-//! Changes by hand are in `by_hand`.
+//! What those that change a tournament by hand share is in `by_hand`.
 
 mod by_hand;
 
@@ -29,6 +29,7 @@ use super::status::{
     Refusal, field, name_fingerprint, not_created, request_id, request_id_used, shutting_down,
     status,
 };
+use by_hand::{change, index, newcomer};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
@@ -37,8 +38,8 @@ use chefshat_hosting::config::{
     MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
 };
 use chefshat_hosting::tournaments::{
-    BeginRefusal, CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem,
-    TournamentHandle, Tournaments,
+    BeginRefusal, ByHand, CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem,
+    TournamentHandle, Tournaments, Who,
 };
 use chefshat_room::ids::{RequestKey, Token, TournamentId, normal_code, random_bytes};
 use chefshat_room::journal::ParticipantKind;
@@ -319,7 +320,7 @@ impl TournamentService for TournamentCalls {
             name_fingerprint: name_fingerprint(&name, &request.name_key)?,
             name,
             kind,
-            max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
+            max_games: index(request.max_games.max(1)),
             stateless: request.stateless,
             at_table: false,
             request_id: request_id(&request.request_id, &caller)?,
@@ -369,7 +370,7 @@ impl TournamentService for TournamentCalls {
         let request = request.into_inner();
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
-        let game = usize::try_from(request.game).unwrap_or(usize::MAX);
+        let game = index(request.game);
         let owner = handle.physical_room(game).map_err(table_problem)?;
         // It is created after its id is committed.
         if self.recorded.rooms().get(owner.subject).is_none() {
@@ -420,8 +421,19 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::WithdrawParticipantRequest>,
     ) -> Result<Response<v1::WithdrawParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.withdraw(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let id = &request.tournament_id;
+        let (handle, by) = self
+            .find_by_ticket_or_owner(&caller, id, &request.ticket, &request.owner_token)
+            .await?;
+        let who = by.map_or_else(|| Who::Number(index(request.participant)), Who::Ticket);
+        let charged = Key::of_caller(&caller);
+        let what = ByHand::Withdraw { who, charged };
+        change(&handle, what).await?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::WithdrawParticipantResponse {
+            tournament,
+        }))
     }
 
     async fn remove_participant(
@@ -429,8 +441,15 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::RemoveParticipantRequest>,
     ) -> Result<Response<v1::RemoveParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.remove(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let what = ByHand::Remove {
+            participant: index(request.participant),
+        };
+        change(&handle, what).await?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::RemoveParticipantResponse { tournament }))
     }
 
     async fn replace_participant(
@@ -438,8 +457,18 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::ReplaceParticipantRequest>,
     ) -> Result<Response<v1::ReplaceParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.replace(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let what = ByHand::Replace {
+            participant: index(request.participant),
+            by: newcomer(&handle, &caller, &request)?,
+        };
+        let ticket = change(&handle, what).await?;
+        Ok(Response::new(v1::ReplaceParticipantResponse {
+            tournament: Some(handle.describe()),
+            ticket: ticket.map_or_else(String::new, |ticket| ticket.to_text()),
+        }))
     }
 
     async fn pause_tournament(
@@ -447,8 +476,12 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::PauseTournamentRequest>,
     ) -> Result<Response<v1::PauseTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.pause(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        change(&handle, ByHand::SetPaused(true)).await?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::PauseTournamentResponse { tournament }))
     }
 
     async fn resume_tournament(
@@ -456,8 +489,12 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::ResumeTournamentRequest>,
     ) -> Result<Response<v1::ResumeTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.resume(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        change(&handle, ByHand::SetPaused(false)).await?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::ResumeTournamentResponse { tournament }))
     }
 
     async fn postpone_game(
@@ -465,8 +502,15 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::PostponeGameRequest>,
     ) -> Result<Response<v1::PostponeGameResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.postpone(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let id = &request.tournament_id;
+        let (handle, by) = self
+            .find_by_ticket_or_owner(&caller, id, &request.ticket, &request.owner_token)
+            .await?;
+        let game = index(request.game);
+        change(&handle, ByHand::Postpone { game, by }).await?;
+        let game = handle.game_now(game);
+        Ok(Response::new(v1::PostponeGameResponse { game }))
     }
 
     async fn call_game(
@@ -474,8 +518,13 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::CallGameRequest>,
     ) -> Result<Response<v1::CallGameResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let response = self.call(&caller, request.into_inner()).await?;
-        Ok(Response::new(response))
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let game = index(request.game);
+        change(&handle, ByHand::Recall { game }).await?;
+        let game = handle.game_now(game);
+        Ok(Response::new(v1::CallGameResponse { game }))
     }
 
     async fn follow_tournament(

@@ -1,5 +1,5 @@
-//! The calls that change a tournament by hand: withdraw, remove, replace, pause, resume, postpone,
-//! call again.
+//! What the calls share that change a tournament by hand: withdraw, remove, replace, pause, resume,
+//! postpone, call again.
 
 use std::sync::Arc;
 
@@ -10,116 +10,13 @@ use tonic::{Code, Status};
 use super::{TournamentCalls, join_problem, refused, stopped};
 use crate::grpc::status::{field, request_id, request_id_used, status, ticket_unknown};
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::Key;
-use chefshat_hosting::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle, Who};
+use chefshat_hosting::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle};
 use chefshat_room::ids::{SecretHash, Token, TournamentToken};
 use chefshat_wire::convert;
 
 impl TournamentCalls {
-    pub(super) async fn withdraw(
-        &self,
-        caller: &Caller,
-        request: v1::WithdrawParticipantRequest,
-    ) -> Result<v1::WithdrawParticipantResponse, Status> {
-        let id = &request.tournament_id;
-        let (handle, by) = self
-            .find_by_ticket_or_owner(caller, id, &request.ticket, &request.owner_token)
-            .await?;
-        let who = by.map_or_else(|| Who::Number(index(request.participant)), Who::Ticket);
-        let charged = Key::of_caller(caller);
-        let what = ByHand::Withdraw { who, charged };
-        change(&handle, what).await?;
-        let tournament = Some(handle.describe());
-        Ok(v1::WithdrawParticipantResponse { tournament })
-    }
-
-    pub(super) async fn remove(
-        &self,
-        caller: &Caller,
-        request: v1::RemoveParticipantRequest,
-    ) -> Result<v1::RemoveParticipantResponse, Status> {
-        let (id, owner) = (&request.tournament_id, &request.owner_token);
-        let handle = self.find_owned(caller, id, owner).await?;
-        let what = ByHand::Remove {
-            participant: index(request.participant),
-        };
-        change(&handle, what).await?;
-        let tournament = Some(handle.describe());
-        Ok(v1::RemoveParticipantResponse { tournament })
-    }
-
-    pub(super) async fn replace(
-        &self,
-        caller: &Caller,
-        request: v1::ReplaceParticipantRequest,
-    ) -> Result<v1::ReplaceParticipantResponse, Status> {
-        let (id, owner) = (&request.tournament_id, &request.owner_token);
-        let handle = self.find_owned(caller, id, owner).await?;
-        let what = ByHand::Replace {
-            participant: index(request.participant),
-            by: newcomer(&handle, caller, &request)?,
-        };
-        let ticket = change(&handle, what).await?;
-        Ok(v1::ReplaceParticipantResponse {
-            tournament: Some(handle.describe()),
-            ticket: ticket.map_or_else(String::new, |ticket| ticket.to_text()),
-        })
-    }
-
-    pub(super) async fn pause(
-        &self,
-        caller: &Caller,
-        request: v1::PauseTournamentRequest,
-    ) -> Result<v1::PauseTournamentResponse, Status> {
-        let (id, owner) = (&request.tournament_id, &request.owner_token);
-        let handle = self.find_owned(caller, id, owner).await?;
-        change(&handle, ByHand::SetPaused(true)).await?;
-        let tournament = Some(handle.describe());
-        Ok(v1::PauseTournamentResponse { tournament })
-    }
-
-    pub(super) async fn resume(
-        &self,
-        caller: &Caller,
-        request: v1::ResumeTournamentRequest,
-    ) -> Result<v1::ResumeTournamentResponse, Status> {
-        let (id, owner) = (&request.tournament_id, &request.owner_token);
-        let handle = self.find_owned(caller, id, owner).await?;
-        change(&handle, ByHand::SetPaused(false)).await?;
-        let tournament = Some(handle.describe());
-        Ok(v1::ResumeTournamentResponse { tournament })
-    }
-
-    pub(super) async fn postpone(
-        &self,
-        caller: &Caller,
-        request: v1::PostponeGameRequest,
-    ) -> Result<v1::PostponeGameResponse, Status> {
-        let id = &request.tournament_id;
-        let (handle, by) = self
-            .find_by_ticket_or_owner(caller, id, &request.ticket, &request.owner_token)
-            .await?;
-        let game = index(request.game);
-        change(&handle, ByHand::Postpone { game, by }).await?;
-        let game = handle.game_now(game);
-        Ok(v1::PostponeGameResponse { game })
-    }
-
-    pub(super) async fn call(
-        &self,
-        caller: &Caller,
-        request: v1::CallGameRequest,
-    ) -> Result<v1::CallGameResponse, Status> {
-        let (id, owner) = (&request.tournament_id, &request.owner_token);
-        let handle = self.find_owned(caller, id, owner).await?;
-        let game = index(request.game);
-        change(&handle, ByHand::Recall { game }).await?;
-        let game = handle.game_now(game);
-        Ok(v1::CallGameResponse { game })
-    }
-
     /// The tournament, with the ticket of a participant; without a ticket, the owner asks.
-    async fn find_by_ticket_or_owner(
+    pub(super) async fn find_by_ticket_or_owner(
         &self,
         caller: &Caller,
         id: &str,
@@ -140,7 +37,7 @@ impl TournamentCalls {
 }
 
 /// Who takes the place of a participant.
-fn newcomer(
+pub(super) fn newcomer(
     handle: &TournamentHandle,
     caller: &Caller,
     request: &v1::ReplaceParticipantRequest,
@@ -180,7 +77,8 @@ fn newcomer(
     })
 }
 
-async fn change(
+/// Makes a change; returns the ticket of a participant who takes the place of another.
+pub(super) async fn change(
     handle: &TournamentHandle,
     what: ByHand,
 ) -> Result<Option<TournamentToken>, Status> {
@@ -212,6 +110,6 @@ fn by_hand_problem(problem: ByHandProblem) -> Status {
 }
 
 /// A number of a message as an index; one too large finds nothing.
-fn index(number: u32) -> usize {
+pub(super) fn index(number: u32) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }
