@@ -98,6 +98,13 @@ mod tests {
     use super::*;
 
     #[tokio::test]
+    async fn a_panic_ends_only_its_own_work() {
+        let pool = Threads::new("test", 1, Priority::Batches).expect("a thread");
+        assert_eq!(pool.run(|| -> u32 { panic!("on purpose") }).await, None);
+        assert_eq!(pool.run(|| 7).await, Some(7));
+    }
+
+    #[tokio::test]
     #[cfg(target_os = "linux")]
     async fn the_threads_of_a_pool_give_way_and_others_do_not() {
         let niceness = || rustix::process::getpriority_process(None).expect("a number");

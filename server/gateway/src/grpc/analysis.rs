@@ -26,7 +26,6 @@ use tonic::{Request, Response, Status};
 
 use super::deadline::deadline;
 use super::limits::make_way;
-use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
 use crate::connections::STALLED_LIMIT;
@@ -130,7 +129,8 @@ impl Analyses {
                 (analysis, advanced, own.used(), begun.elapsed(), slice)
             };
             let (advanced, own, passed, slice);
-            (analysis, advanced, own, passed, slice) = on_pool(&self.pool, work).await?;
+            (analysis, advanced, own, passed, slice) =
+                self.pool.run(work).await.ok_or_else(internal)?;
             if self.closing.is_cancelled() {
                 return Err(shutting_down());
             }

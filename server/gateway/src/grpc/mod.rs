@@ -19,7 +19,6 @@ mod new_room;
 mod pace;
 mod pages;
 mod play;
-mod pool;
 mod recorded;
 mod records;
 mod refusals;

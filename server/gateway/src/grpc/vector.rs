@@ -28,7 +28,6 @@ use tonic::{Code, Request, Response, Status, Streaming};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::new_room::branch_refused;
-use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use chefshat_admission::access::Caller;
@@ -246,13 +245,12 @@ impl Runner {
         Ok(Some(Command::Next(request.map_err(vector_refused)?)))
     }
 
-    /// Runs work on the pool's threads. If the call is cancelled, the work completes and its result
-    /// is dropped.
+    /// Runs work on the pool's threads.
     async fn run_on_pool<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        on_pool(&self.service.pool, work).await
+        self.service.pool.run(work).await.ok_or_else(internal)
     }
 
     async fn send(&self, response: ResponseKind) -> Result<(), End> {
