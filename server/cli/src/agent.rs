@@ -15,7 +15,7 @@ use chefshat_record::jsonl;
 use clap::Args;
 
 use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
-use super::error::tell;
+use super::error::{plain, tell};
 use super::llm::LlmArgs;
 use super::player::{Player, PlayerArg, player_arg};
 use super::remote::{MAX_PACE_MS, RemoteAgent};
@@ -107,7 +107,7 @@ impl AgentCommand {
                     all_played = false;
                     match self.json {
                         true => say(refused_json(error))?,
-                        false => say(format_args!("there was no seat: {error}"))?,
+                        false => say(plain(format_args!("there was no seat: {error}")))?,
                     }
                     continue;
                 }
@@ -218,7 +218,7 @@ fn player_of(record: &Path, seat: u32) -> Result<Arc<RecordedPlayer>, CommandErr
 fn in_words(played: &Result<Outcome, PlayError>) -> String {
     match played {
         Ok(outcome) => outcome_in_words(outcome),
-        Err(error) => format!("the seat was lost: {error}"),
+        Err(error) => plain(format_args!("the seat was lost: {error}")),
     }
 }
 

@@ -13,8 +13,15 @@ pub fn say(line: impl Display) -> Result<(), CommandError> {
 }
 
 /// Writes a line to standard error, for a program that runs on if nobody can read it.
-pub(crate) fn tell(line: impl Display) {
-    let _ = writeln!(anstream::stderr().lock(), "{line}");
+pub fn tell(line: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{}", plain(line));
+}
+
+/// A text with words of a server or a file, which may contain anything, without what steers a
+/// terminal, such as escape codes.
+pub(crate) fn plain(text: impl Display) -> String {
+    let steers = |sign: char| sign.is_control() && !['\n', '\t'].contains(&sign);
+    text.to_string().replace(steers, "")
 }
 
 /// The exit code of a command that has printed all it has to say, also if the reader of the output
@@ -35,4 +42,15 @@ pub fn is_broken_pipe(error: &CommandError) -> bool {
     error
         .downcast_ref::<io::Error>()
         .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_of_others_do_not_steer_the_terminal() {
+        let said = plain("a\u{1b}[2J\tb\r\n\u{9b}31mc\u{7}");
+        assert_eq!(said, "a[2J\tb\n31mc");
+    }
 }

@@ -1,7 +1,7 @@
 //! How browsers of the local network reach a server that listens on every address of its machine:
 //! the machine's own addresses, as text and as a QR code.
 
-use std::io::{self, IsTerminal as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::path::Path;
 
@@ -40,7 +40,8 @@ pub(super) fn print_addresses(listening_on: SocketAddr, scheme: &str) {
     if let Some(code) = (urls.first()).and_then(|url| qr_code(url))
         && io::stderr().is_terminal()
     {
-        tell(format_args!("{code}"));
+        // Its colours are for the terminal.
+        let _ = writeln!(anstream::stderr().lock(), "{code}");
     }
 }
 

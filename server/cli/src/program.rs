@@ -73,12 +73,7 @@ pub fn run<C: Commands>() -> ExitCode {
         // The reader of the output has closed the pipe, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            // A server's message may contain anything, such as the escape codes of a terminal.
-            let steers = |sign: char| sign.is_control() && !['\n', '\t'].contains(&sign);
-            tell(format_args!(
-                "chefshat: {}",
-                error.to_string().replace(steers, "")
-            ));
+            tell(format_args!("chefshat: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -165,7 +165,10 @@ impl List {
         let (tokens, unreadable): (Vec<_>, Vec<_>) = entries.into_iter().partition(Result::is_ok);
         let tokens: Vec<_> = tokens.into_iter().flatten().collect();
         for unreadable in unreadable.into_iter().filter_map(Result::err) {
-            eprintln!("an entry grants nothing: {}", unreadable.problem);
+            tell(format_args!(
+                "an entry grants nothing: {}",
+                unreadable.problem
+            ));
         }
         let now_ms = since_epoch_ms();
         if self.place.json {

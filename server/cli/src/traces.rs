@@ -10,7 +10,7 @@ use tracing_subscriber::Layer;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::registry::LookupSpan;
 
-use crate::error::CommandError;
+use crate::error::{CommandError, tell};
 
 /// Sends spans until it is dropped, which sends the last ones.
 pub(super) struct Traces {
@@ -63,7 +63,9 @@ impl Traces {
 impl Drop for Traces {
     fn drop(&mut self) {
         if let Err(error) = self.provider.shutdown() {
-            anstream::eprintln!("chefshat: the last spans were not sent: {error}");
+            tell(format_args!(
+                "chefshat: the last spans were not sent: {error}"
+            ));
         }
     }
 }

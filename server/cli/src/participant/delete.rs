@@ -16,6 +16,7 @@ use super::super::numbers::counted;
 use super::super::{CommandError, say};
 use super::who::{Who, check};
 use crate::connect::ServerArg;
+use crate::error::tell;
 
 const HELP: &str = "\
 Without --fingerprint, all who played under the name become one participant. The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl, markers included; expressions of the \
@@ -87,7 +88,7 @@ impl Delete {
         }
         check(&skipped, name)?;
         if !found && !self.json {
-            anstream::eprintln!("nothing is stored about {name:?}");
+            tell(format_args!("nothing is stored about {name:?}"));
         }
         Ok(if found {
             ExitCode::SUCCESS

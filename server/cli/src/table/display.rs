@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::super::{CommandError, say};
 use super::line;
 use super::words::{state_in_words, verdict_in_words};
+use crate::error::plain;
 
 /// Prints states, verdicts and problems.
 pub(super) struct Display {
@@ -87,7 +88,7 @@ impl Display {
     pub(super) fn problem(&self, line: &str, problem: &str) -> Result<(), CommandError> {
         match self.json {
             true => say(json!({"event": "problem", "line": line, "message": problem})),
-            false => say(problem),
+            false => say(plain(problem)),
         }
     }
 

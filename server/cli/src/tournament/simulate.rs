@@ -19,6 +19,7 @@ use chefshat_tournament::{
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::super::error::tell;
 use super::super::numbers::{counted, grouped};
 use super::super::output::{self, heading, line};
 use super::super::rules_args::{RulesArgs, by_flag};
@@ -94,11 +95,11 @@ impl Simulate {
         }
         pool.install(|| play_offline(&mut tournament, rules, self.seed, &|games| bar.inc(games)))?;
         bar.finish_and_clear();
-        eprintln!(
+        tell(format_args!(
             "{} in {:.1} s",
             counted(games, "game"),
             start.elapsed().as_secs_f64()
-        );
+        ));
         let results = self.results(&tournament);
         let written = csv.map(|file| files::write_standings(file, &results));
         let mut out = anstream::stdout().lock();

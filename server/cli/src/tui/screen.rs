@@ -13,7 +13,7 @@ use ratatui::crossterm::terminal::is_raw_mode_enabled;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
-use super::super::CommandError;
+use crate::error::{CommandError, tell};
 use crate::stops::Stops;
 
 /// Keys that may wait to be handled.
@@ -109,7 +109,9 @@ pub(crate) fn missing(instead: &str) -> Option<ExitCode> {
     if io::stdout().is_terminal() && io::stdin().is_terminal() {
         return None;
     }
-    anstream::eprintln!("chefshat: this command needs an interactive terminal; {instead}");
+    tell(format_args!(
+        "chefshat: this command needs an interactive terminal; {instead}"
+    ));
     Some(ExitCode::from(NO_TERMINAL))
 }
 

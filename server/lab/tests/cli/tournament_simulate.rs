@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, closed_pipe, on_a_full_disk, typed, typed_on_a_full_disk};
+use super::run::{Ended, closed_pipe, on_a_full_disk, program, typed, typed_on_a_full_disk};
 
 fn simulate(flags: &str) -> Ended {
     typed(&format!("tournament simulate {flags}"))
@@ -56,6 +56,14 @@ fn the_same_seed_gives_the_same_standings_on_any_number_of_threads() {
         "no progress where there is no terminal"
     );
     ended.assert_table_fits(8);
+}
+
+#[test]
+fn nobody_has_to_read_how_long_it_took() {
+    let mut unread = program();
+    unread.args("tournament simulate --format swiss --agents greedy*4".split(' '));
+    let ended = Ended::of(unread.stderr(closed_pipe()).output().unwrap());
+    assert!(ended.well().stdout.contains("greedy 4"));
 }
 
 #[test]
