@@ -6,10 +6,12 @@
 //! of the command line before it is parsed, so relations between settings (`requires`,
 //! `conflicts_with`) are checked where the settings are used, not by clap.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::builder::Resettable;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Parser};
 use serde_json::{Value, json};
@@ -59,7 +61,8 @@ impl Invocation {
     /// # Errors
     /// The file is unreadable, or has a wrong key or value.
     pub(crate) fn of_process<C: Parser>() -> Result<(C, Self), CommandError> {
-        let mut matches = grouped(C::command()).get_matches();
+        let command = || without_empty_variables(C::command());
+        let mut matches = grouped(command()).get_matches();
         let path = match matches.subcommand() {
             Some((name, sub)) if COMMANDS.contains(&name) => sub.get_one::<PathBuf>(CONFIG),
             _ => None,
@@ -69,7 +72,7 @@ impl Invocation {
             None => None,
         };
         if let Some(file) = &file {
-            matches = grouped(file.as_defaults(C::command())).get_matches();
+            matches = grouped(file.as_defaults(command())).get_matches();
         }
         let cli = C::from_arg_matches(&matches)
             .unwrap_or_else(|error| error.format(&mut C::command()).exit());
@@ -90,6 +93,17 @@ impl Invocation {
     pub fn command(&self) -> Command {
         self.command.clone()
     }
+}
+
+/// A command line for which a variable of the environment that is empty is not set: files of services
+/// and containers cannot leave one out.
+fn without_empty_variables(command: Command) -> Command {
+    let is_empty = |name: &OsStr| std::env::var_os(name).is_some_and(|value| value.is_empty());
+    let command = command.mut_args(|argument| match argument.get_env().is_some_and(is_empty) {
+        true => argument.env(Resettable::Reset),
+        false => argument,
+    });
+    command.mut_subcommands(without_empty_variables)
 }
 
 impl ConfigCommand {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
-use clap::builder::{FalseyValueParser, RangedU64ValueParser};
+use clap::builder::{FalseyValueParser, NonEmptyStringValueParser, RangedU64ValueParser};
 use futures::future::OptionFuture;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
@@ -96,7 +96,8 @@ pub(super) struct Settings {
         long = "allow-host",
         env = "CHEFSHAT_ALLOW_HOST",
         value_name = "HOST",
-        value_delimiter = ','
+        value_delimiter = ',',
+        value_parser = NonEmptyStringValueParser::new()
     )]
     allowed_hosts: Vec<String>,
     /// Collector of OpenTelemetry that receives a span for each room and decision, over gRPC, such as
@@ -326,7 +327,7 @@ impl Serve {
         let kept_in = data_dir.clone();
         let grace = settings.grace;
         let is_node = settings.node.database.is_some();
-        let allowed_hosts = without_empty(settings.allowed_hosts);
+        let allowed_hosts = settings.allowed_hosts;
         // The metrics need no token: pages of other names must not reach them on this machine.
         let has_local_metrics = metrics_address.is_some_and(|address| address.ip().is_loopback());
         let metrics_hosts = has_local_metrics || !allowed_hosts.is_empty();
@@ -353,7 +354,7 @@ impl Serve {
                 .then(|| Duration::from_secs(settings.connection_age)),
             tls,
             grace: Duration::from_secs(settings.grace),
-            allowed_origins: without_empty(settings.allowed_origins),
+            allowed_origins: settings.allowed_origins,
             webhooks,
             painter: lab::program().map(PaintingSettings::new),
             ..ServerConfig::default()
@@ -498,16 +499,9 @@ fn keep_games(text: &str) -> Result<KeepGames, String> {
     }
 }
 
-/// The values of a setting; an empty variable has none.
-fn without_empty(mut values: Vec<String>) -> Vec<String> {
-    values.retain(|value| !value.is_empty());
-    values
-}
-
-/// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means
-/// none.
+/// Checks a web origin as browsers send it: scheme and host without a path.
 fn origin(text: &str) -> Result<String, String> {
-    if text.is_empty() || text == "*" {
+    if text == "*" {
         return Ok(text.to_owned());
     }
     let host = (text.strip_prefix("https://")).or(text.strip_prefix("http://"));
@@ -538,10 +532,11 @@ mod tests {
 
     #[test]
     fn origins_are_as_browsers_send_them() {
-        for good in ["", "*", "http://localhost:8080", "https://example.org"] {
+        for good in ["*", "http://localhost:8080", "https://example.org"] {
             assert_eq!(origin(good).as_deref(), Ok(good));
         }
         for bad in [
+            "",
             "example.org",
             "https://",
             "https://example.org/",

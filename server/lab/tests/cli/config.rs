@@ -59,6 +59,28 @@ fn flags_override_variables_which_override_the_file_which_overrides_defaults() {
 }
 
 #[test]
+fn an_empty_variable_is_not_set() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("chefshat.toml");
+    fs::write(&file, "no-records = true\nallow-host = [\"a\"]\n").unwrap();
+    let mut config = program();
+    config.args(["config", "--json", "--config", file.to_str().unwrap()]);
+    let printed = ended(&mut config).clean().json();
+    for setting in printed["settings"].as_array().unwrap() {
+        let name = setting["name"].as_str().unwrap();
+        config.env(
+            format!("CHEFSHAT_{}", name.to_uppercase().replace('-', "_")),
+            "",
+        );
+    }
+    assert_eq!(ended(&mut config).clean().json(), printed);
+    let mut list = program();
+    list.args(["room", "list", "--server", "x://y"]);
+    list.env("CHEFSHAT_TOKEN", "").env("CHEFSHAT_CA", "");
+    ended(&mut list).assert_failed("is not the address of a server");
+}
+
+#[test]
 fn the_printed_configuration_can_be_read_again() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("chefshat.toml");
