@@ -15,7 +15,9 @@ use super::error::tell;
 /// Time to wait for a server or a file.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 /// The variable with a ticket.
-const TICKET: &str = "CHEFSHAT_TICKET";
+pub(crate) const TICKET: &str = "CHEFSHAT_TICKET";
+/// The variable with the ticket of a physical table.
+pub(crate) const TABLE_TICKET: &str = "CHEFSHAT_TABLE_TICKET";
 /// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -67,25 +69,26 @@ impl ServerArg {
         }
     }
 
-    /// A command for this server with a ticket, in a variable: flags show in lists of processes.
-    pub fn with_ticket(&self, command: &str, ticket: &str) -> String {
-        let ca = self.authorities();
+    /// The flags with which a command reaches this server, for people to type.
+    pub fn flags(&self) -> String {
+        let ca = self.ca.as_ref();
         let ca = ca.map_or_else(String::new, |ca| format!(" --ca {}", ca.display()));
-        let there = format!("--server {}{ca}", self.server);
-        match cfg!(windows) {
-            true => format!("chefshat {command} {there} --ticket {ticket}"),
-            false => format!("{TICKET}={ticket} chefshat {command} {there}"),
-        }
+        format!("--server {}{ca}", self.server)
     }
 
-    fn authorities(&self) -> Option<&Path> {
-        self.ca.as_deref().filter(|ca| !ca.as_os_str().is_empty())
+    /// A command for this server with a ticket, in a variable: flags show in lists of processes.
+    pub fn with_ticket(&self, variable: &str, ticket: &str, command: &str) -> String {
+        let there = self.flags();
+        match cfg!(windows) {
+            true => format!("chefshat {command} {there} --ticket {ticket}"),
+            false => format!("{variable}={ticket} chefshat {command} {there}"),
+        }
     }
 
     async fn attempt(&self) -> Result<Client, chefshat_client::Error> {
         let options = ConnectOptions {
             token: self.token.clone().filter(|token| !token.is_empty()),
-            ca: self.authorities().map(Path::to_path_buf),
+            ca: self.ca.clone(),
         };
         Client::connect_with(&self.server, &options).await
     }
@@ -357,8 +360,6 @@ mod tests {
 
     #[test]
     fn what_is_empty_is_not_given() {
-        let server = ServerArg::new("h:1".to_owned(), None, Some(PathBuf::new()));
-        assert_eq!(server.authorities(), None);
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("owner");
         let by_flag = |token: &str, file: Option<&Path>| {
@@ -387,7 +388,7 @@ mod tests {
     #[test]
     fn a_ticket_stays_out_of_lists_of_processes() {
         let server = ServerArg::new("h:1".to_owned(), None, Some(PathBuf::from("ca.pem")));
-        let command = server.with_ticket("play", "T");
+        let command = server.with_ticket(TICKET, "T", "play");
         if cfg!(unix) {
             assert_eq!(
                 command,

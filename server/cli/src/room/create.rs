@@ -10,7 +10,7 @@ use chefshat_engine::{MAX_SEATS, RuleSet};
 use chefshat_record::convert::kind_from_name;
 use clap::Args;
 
-use super::super::connect::{ServerArg, attendant_link};
+use super::super::connect::{ServerArg, TABLE_TICKET, attendant_link};
 use super::super::policy_args::PolicyArgs;
 use super::super::remote::offered_agents;
 use super::super::rules_args::{RulesArgs, by_flag};
@@ -134,10 +134,11 @@ impl Create {
             if let Some(table) = table {
                 say(format_args!("table ticket {}", table.ticket))?;
                 say(format_args!("attendant    {}", table.link))?;
-                let server = self.server.url();
+                let report = self
+                    .server
+                    .with_ticket(TABLE_TICKET, &table.ticket, "table");
                 say(format_args!(
-                    "or report what happens at the table here: chefshat table --server {server} --ticket {}",
-                    table.ticket
+                    "or report what happens at the table here: {report}"
                 ))?;
             }
             for words in next_steps(&room, wizards, &self.server, &code) {
@@ -343,7 +344,7 @@ fn next_steps(room: &v1::Room, wizards: usize, server: &ServerArg, code: &str) -
             _ => free,
         }
     };
-    let there = format!("--server {} --code {code}", server.url());
+    let there = format!("{} --code {code}", server.flags());
     let page = format!("{}/join/{code}", server.page());
     let steps = kinds.into_iter().filter_map(|kind| {
         let (whom, command) = match kind {
@@ -508,13 +509,14 @@ mod tests {
                 seats,
                 ..v1::Room::default()
             };
-            let server = ServerArg::new("http://[::1]:7/".to_owned(), None, None);
+            let ca = Some(PathBuf::from("ca.pem"));
+            let server = ServerArg::new("http://[::1]:7/".to_owned(), None, ca);
             next_steps(&room, wizards, &server, "BCDF2345")
         };
         let any = v1::ParticipantKind::Unspecified;
         let (human, robot) = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
         assert!(words(0, vec![seat("Ada", any)]).is_empty());
-        let there = "--server http://[::1]:7/ --code BCDF2345";
+        let there = "--server http://[::1]:7/ --ca ca.pem --code BCDF2345";
         let page = "http://[::1]:7/join/BCDF2345";
         let people = format!("chefshat play {there}, or in a browser at {page}");
         assert_eq!(

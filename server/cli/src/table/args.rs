@@ -8,7 +8,7 @@ use tokio::time::{Duration, Instant, sleep};
 use tonic::Code;
 
 use super::super::CommandError;
-use super::super::connect::{PATIENCE, ServerArg};
+use super::super::connect::{PATIENCE, ServerArg, TABLE_TICKET};
 
 /// Time between two attempts to report.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -21,7 +21,7 @@ pub(super) struct TableArgs {
     #[arg(
         long,
         required = true,
-        env = "CHEFSHAT_TABLE_TICKET",
+        env = TABLE_TICKET,
         hide_env_values = true
     )]
     pub(super) ticket: Option<String>,

@@ -187,14 +187,13 @@ impl Create {
 
     /// How others take part, and how the tournament starts.
     fn next_steps(&self, tournament: &v1::Tournament, code: &str) -> String {
-        let (id, server) = (&tournament.tournament_id, self.server.url());
+        let (id, there) = (&tournament.tournament_id, self.server.flags());
         if tournament.state() != v1::TournamentState::Open {
             return format!(
-                "it has started; follow it with: chefshat tournament follow {id} --server {server}"
+                "it has started; follow it with: chefshat tournament follow {id} {there}"
             );
         }
-        let join =
-            format!("chefshat tournament join --agent greedy --server {server} --code {code}");
+        let join = format!("chefshat tournament join --agent greedy {there} --code {code}");
         let owner = match &self.owner_file {
             Some(file) => format!("--owner-file {}", file.display()),
             None => "--owner-token TOKEN".to_owned(),
@@ -207,12 +206,12 @@ impl Create {
                 format!("it starts when {count} have joined, at the latest at {at}")
             }
             (None, None) => {
-                format!("start it with: chefshat tournament start {id} --server {server} {owner}")
+                format!("start it with: chefshat tournament start {id} {there} {owner}")
             }
         };
         let at_table = match self.physical_tables {
             Some(_) => format!(
-                "add those at a physical table with: chefshat tournament add {id} --name NAME --server {server} {owner}\n"
+                "add those at a physical table with: chefshat tournament add {id} --name NAME {there} {owner}\n"
             ),
             None => String::new(),
         };

@@ -35,7 +35,7 @@ use chefshat_record::jsonl;
 use clap::Args;
 
 use crate::CommandError;
-use crate::connect::{ServerArg, in_environment, ticket_in_environment};
+use crate::connect::{ServerArg, TICKET, in_environment, ticket_in_environment};
 use crate::data_dir;
 use crate::error::tell;
 use crate::name_key::NameKeyArg;
@@ -121,17 +121,15 @@ impl Play {
             .transpose()?
         else {
             let taken = self.take().await?;
-            let server = self.server.url().to_owned();
-            let back = self.server.with_ticket("play", &taken.ticket);
+            let there = self.server.flags();
+            let back = self.server.with_ticket(TICKET, &taken.ticket, "play");
             // It stays above the screen, whatever ends that.
             tell(format_args!("to resume: {back}"));
             let hints = Hints {
                 back: Some(back),
-                results: format!("chefshat tournament results --server {server}"),
+                results: format!("chefshat tournament results {there}"),
                 page: Some(self.server.page()),
-                record: Box::new(move |game| {
-                    format!("chefshat records get {game} --server {server}")
-                }),
+                record: Box::new(move |game| format!("chefshat records get {game} {there}")),
             };
             return print_end(&play(taken, self.times).await?, &hints);
         };
