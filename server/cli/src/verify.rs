@@ -2,7 +2,7 @@
 //! `chefshat-record` checks a record; this module finds the files, checks them on all cores and
 //! prints the results.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::data_dir::RecordsArg;
+use super::error::{after_printing, plain};
 use super::numbers::counted;
 use super::{CommandError, progress};
 
@@ -73,6 +74,8 @@ impl Verify {
         let records = files.len() + found.missing.len();
         let bar = progress::of_items(files.len().try_into().unwrap_or(u64::MAX), "records");
         let (mut fitting, mut decisions, mut uncheckable) = (0usize, 0u64, 0u64);
+        // All are checked, also if nobody reads what is printed of them.
+        let mut printed = Ok(());
         for files in files.chunks(AT_A_TIME) {
             let checked: Vec<_> = files
                 .par_iter()
@@ -90,7 +93,7 @@ impl Verify {
                 decisions += fits.replayed.decisions;
                 uncheckable += u64::from(fits.replayed.uncheckable.is_some());
             }
-            bar.suspend(|| print(&checked, self.json))?;
+            printed = printed.and_then(|()| bar.suspend(|| print(&checked, self.json)));
         }
         bar.finish_and_clear();
         for missing in found.missing {
@@ -99,30 +102,31 @@ impl Verify {
                 problem: missing.problem.to_string(),
                 uncheckable: false,
             };
-            print(&[(&missing.path, Err(problem))], self.json)?;
+            let missing = [(&missing.path, Err(problem))];
+            printed = printed.and_then(|()| print(&missing, self.json));
         }
         if !self.json {
-            let mut out = anstream::stdout().lock();
-            match records - fitting {
-                0 => writeln!(
-                    out,
-                    "{} {}, {}",
+            let mut words = match records - fitting {
+                0 => format!(
+                    "{} {}, {}\n",
                     counted(records as u64, "record"),
                     if fitting == 1 { "fits" } else { "fit" },
                     counted(decisions, "decision")
-                )?,
-                wrong => writeln!(out, "{wrong} of {records} records do not fit")?,
-            }
+                ),
+                wrong => format!("{wrong} of {records} records do not fit\n"),
+            };
             if uncheckable > 0 {
                 let signatures = counted(uncheckable, "signature");
-                writeln!(out, "{signatures} cannot be checked")?;
+                words.push_str(&format!("{signatures} cannot be checked\n"));
             }
+            printed = printed.and_then(|()| write!(io::stdout(), "{words}"));
         }
-        Ok(match (fitting == records, uncheckable) {
+        let code = match (fitting == records, uncheckable) {
             (false, _) => ExitCode::FAILURE,
             (true, 0) => ExitCode::SUCCESS,
             (true, _) => ExitCode::from(UNCHECKABLE),
-        })
+        };
+        after_printing(printed, code)
     }
 }
 
@@ -194,8 +198,8 @@ pub(super) fn ending(replayed: &Replayed) -> &'static str {
     }
 }
 
-fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<(), CommandError> {
-    let mut out = anstream::stdout().lock();
+fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> io::Result<()> {
+    let mut out = io::stdout().lock();
     for (file, checked) in checked {
         let name = file.display();
         match (checked, json) {
@@ -217,24 +221,10 @@ fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<()
                     false => "",
                 }
             )?,
-            (
-                Err(Problem {
-                    line: Some(line),
-                    problem,
-                    ..
-                }),
-                false,
-            ) => {
-                writeln!(out, "{name}: line {line}: {problem}")?;
+            (Err(Problem { line, problem, .. }), false) => {
+                let line = line.map_or_else(String::new, |line| format!("line {line}: "));
+                writeln!(out, "{name}: {line}{}", plain(problem))?;
             }
-            (
-                Err(Problem {
-                    line: None,
-                    problem,
-                    ..
-                }),
-                false,
-            ) => writeln!(out, "{name}: {problem}")?,
         }
     }
     Ok(())

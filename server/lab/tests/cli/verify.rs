@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::run::{chefshat, fixture};
+use super::run::{chefshat, fixture, typed_into_a_closed_pipe};
 
 /// A data folder with two records, the second damaged on line 9.
 fn data_dir() -> tempfile::TempDir {
@@ -164,6 +164,15 @@ fn missing_records_are_reported() {
         "{}",
         ended.stdout
     );
+}
+
+#[test]
+fn a_damaged_record_is_found_if_nobody_reads_the_first_ones() {
+    let folder = data_dir();
+    let verify = format!("verify --data-dir {}", folder.path().display());
+    typed_into_a_closed_pipe(&verify).ended_with(1);
+    let whole = fixture("records/committed.jsonl");
+    typed_into_a_closed_pipe(&format!("verify {}", whole.display())).clean();
 }
 
 #[test]
