@@ -5,7 +5,7 @@ use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::ActionSpace;
 
 use super::events::{self, EventText};
-use crate::narration::awaited::AwaitedSeat;
+use crate::narration::awaited::{AwaitedSeat, left_ms};
 use crate::narration::hand::Hand;
 use crate::narration::story;
 use crate::narration::view::GameView;
@@ -15,19 +15,8 @@ use crate::narration::view::GameView;
 pub struct Open {
     /// The request.
     pub request: v1::DecisionRequest,
-    /// When it arrived.
+    /// When it arrived, or the game was resumed.
     since_ms: u64,
-}
-
-impl Open {
-    /// Milliseconds left for the decision, and then in the time bank.
-    pub fn left_ms(&self, now_ms: u64) -> (u64, u64) {
-        let gone = now_ms.saturating_sub(self.since_ms);
-        let (time, bank) = (self.request.time_left_ms, self.request.bank_left_ms);
-        let (time, bank) = (u64::from(time), u64::from(bank));
-        let beyond = gone.saturating_sub(time);
-        (time.saturating_sub(gone), bank.saturating_sub(beyond))
-    }
 }
 
 /// A seat as its participant knows it.
@@ -95,6 +84,17 @@ impl Live {
         self.open.is_some() || self.is_over()
     }
 
+    /// Milliseconds left for the open decision, and then in the time bank: all of them while a
+    /// physical table is paused, and again from then on.
+    pub fn left_ms(&self, now_ms: u64) -> Option<(u64, u64)> {
+        let open = self.open.as_ref()?;
+        let gone_ms = match self.view.paused {
+            true => 0,
+            false => now_ms.saturating_sub(open.since_ms),
+        };
+        Some(left_ms(&open.request, gone_ms))
+    }
+
     /// Takes an update that arrived at `now_ms`.
     pub fn take(&mut self, update: Update, now_ms: u64) {
         match update {
@@ -110,7 +110,9 @@ impl Live {
                 }
             }
             Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
-            Update::Events(batch) => batch.events.iter().for_each(|event| self.event(event)),
+            Update::Events(batch) => {
+                (batch.events.iter()).for_each(|event| self.event(event, now_ms));
+            }
             Update::Decision(request) => {
                 self.awaited = None;
                 self.open = Some(Open {
@@ -144,9 +146,14 @@ impl Live {
         (self.open).take_if(|open| open.request.decision_id <= decision_id);
     }
 
-    fn event(&mut self, event: &v1::GameEvent) {
+    fn event(&mut self, event: &v1::GameEvent, now_ms: u64) {
         if self.is_decided_by(event) {
             self.open = None;
+        }
+        if let (Some(Kind::TablePaused(table)), Some(open)) = (&event.kind, &mut self.open)
+            && !table.paused
+        {
+            open.since_ms = now_ms;
         }
         let text = events::advance(&mut self.view, self.me, event);
         match &event.kind {

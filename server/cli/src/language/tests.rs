@@ -1,7 +1,7 @@
 //! A game of the engine as its seat 0 reads it. The transcript is committed, to be read as a
 //! difference.
 
-use chefshat_client::v1::{self, seat_update::Update};
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::{Action, ActionId, RuleSetSpec, Seat, Stop, Viewer};
 
 use super::live::Live;
@@ -100,4 +100,28 @@ fn what_happened_begins_after_the_event_that_was_asked_for() {
         none,
         format!("seq {last}\nNot your turn. Call wait_for_turn again.")
     );
+}
+
+#[test]
+fn after_a_pause_a_decision_has_its_full_time_again() {
+    let mut live = Live::new(GameView::default(), Some(0));
+    let request = v1::DecisionRequest {
+        time_left_ms: 30_000,
+        bank_left_ms: 9_000,
+        ..v1::DecisionRequest::default()
+    };
+    live.take(Update::Decision(request), 1_000);
+    let left = |live: &Live, now_ms| live.left_ms(now_ms).unwrap();
+    let full = (30_000, 9_000);
+    assert_eq!(left(&live, 33_000), (0, 7_000));
+    for (paused, now_ms) in [(true, 34_000), (false, 90_000)] {
+        let paused = Kind::TablePaused(v1::TablePaused { paused });
+        let events = vec![v1::GameEvent {
+            kind: Some(paused),
+            ..v1::GameEvent::default()
+        }];
+        live.take(Update::Events(v1::EventBatch { events }), now_ms);
+        assert_eq!(left(&live, now_ms), full);
+    }
+    assert_eq!(left(&live, 91_000), (29_000, 9_000));
 }

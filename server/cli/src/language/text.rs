@@ -13,7 +13,7 @@ use super::live::{Live, Open};
 use crate::narration::hand::Hand;
 use crate::narration::story;
 use crate::narration::title;
-use crate::narration::view::{End, GameView};
+use crate::narration::view::End;
 use crate::numbers::ordinal;
 
 /// What happened after an event, then the open decision, or whom the game waits for.
@@ -33,7 +33,7 @@ fn now(live: &Live, now_ms: u64) -> String {
         return over;
     }
     if let Some(open) = &live.open {
-        let mut lines = vec![asked(&live.view, open, now_ms)];
+        let mut lines = vec![asked(live, open, now_ms)];
         // Who has no choice does not need to see what it depends on.
         if legal_count(&open.request) > 1 {
             if open.request.kind() == v1::DecisionKind::Turn {
@@ -84,7 +84,7 @@ fn waiting(live: &Live, now_ms: u64) -> String {
 }
 
 /// The decision: its number, what it must be, the time for it.
-fn asked(view: &GameView, open: &Open, now_ms: u64) -> String {
+fn asked(live: &Live, open: &Open, now_ms: u64) -> String {
     let request = &open.request;
     let what = match request.kind() {
         v1::DecisionKind::Exchange => {
@@ -95,13 +95,13 @@ fn asked(view: &GameView, open: &Open, now_ms: u64) -> String {
             format!(
                 "give card {}{of} to {}",
                 gift.number,
-                view.name(gift.receiver)
+                live.view.name(gift.receiver)
             )
         }
         v1::DecisionKind::SpecialAction => "declare or decline".to_owned(),
         _ => turn(request.play_requirement),
     };
-    let (time, bank) = open.left_ms(now_ms);
+    let (time, bank) = live.left_ms(now_ms).unwrap_or_default();
     let bank = match bank {
         0 => String::new(),
         bank => format!(" +{}", bank / 1000),

@@ -482,11 +482,7 @@ impl LanguageModel {
 
     /// Until when the answer to the open decision has to be known: early enough to reach the server.
     fn deadline(&self) -> Instant {
-        let left = self
-            .live
-            .open
-            .as_ref()
-            .map(|open| open.left_ms(self.now_ms()));
+        let left = self.live.left_ms(self.now_ms());
         let time = Duration::from_millis(left.map_or(0, |(time, _)| time));
         let (least, most) = RESERVE_RANGE;
         Instant::now() + time.saturating_sub((time / RESERVE).clamp(least, most))

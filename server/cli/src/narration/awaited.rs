@@ -8,6 +8,14 @@ use super::view::GameView;
 /// Time after which it is worth saying that the game waits for a seat that is connected.
 const PATIENCE_MS: u64 = 5_000;
 
+/// Milliseconds left for a decision that was requested `gone_ms` ago, and then in the time bank.
+pub fn left_ms(request: &v1::DecisionRequest, gone_ms: u64) -> (u64, u64) {
+    let (time, bank) = (request.time_left_ms, request.bank_left_ms);
+    let (time, bank) = (u64::from(time), u64::from(bank));
+    let beyond = gone_ms.saturating_sub(time);
+    (time.saturating_sub(gone_ms), bank.saturating_sub(beyond))
+}
+
 /// A seat whose decision is open.
 #[derive(Debug, Clone)]
 pub struct AwaitedSeat {

@@ -6,7 +6,7 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
-use crate::narration::awaited::AwaitedSeat;
+use crate::narration::awaited::{AwaitedSeat, left_ms};
 use crate::narration::story;
 use crate::narration::view::GameView;
 use crate::narration::words;
@@ -195,14 +195,8 @@ impl App {
     /// Milliseconds left for the open decision, and then in the time bank.
     pub(super) fn clock(&self, now_ms: u64) -> Option<(u64, u64)> {
         let open = self.open.as_ref().filter(|_| !self.table.paused)?;
-        let gone = now_ms.saturating_sub(open.since_ms);
-        let request = &open.decision.request;
-        let (time, bank) = (
-            u64::from(request.time_left_ms),
-            u64::from(request.bank_left_ms),
-        );
-        let beyond = gone.saturating_sub(time);
-        Some((time.saturating_sub(gone), bank.saturating_sub(beyond)))
+        let gone_ms = now_ms.saturating_sub(open.since_ms);
+        Some(left_ms(&open.decision.request, gone_ms))
     }
 
     /// Whether keys act on the table, not on a dialog or the log.
