@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::kind::KindArg;
 use crate::name_key::NameKeyArg;
-use crate::numbers::seat_number;
+use crate::numbers::{counted, seat_number};
 use chefshat_agents::{BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Error, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
@@ -183,8 +183,10 @@ impl AgentCommand {
             .await?;
         let waits = match joined.room.as_ref().map_or(0, free_seats) {
             0 => String::new(),
-            1 => "waits for 1 other seat to be taken, then ".to_owned(),
-            free => format!("waits for {free} other seats to be taken, then "),
+            free => {
+                let others = counted(free as u64, "other seat");
+                format!("waits for {others} to be taken, then ")
+            }
         };
         let number = seat_number(joined.seat);
         tell(format_args!(

@@ -125,9 +125,10 @@ impl Status {
         if without_node != WithoutNode::default() {
             writeln!(
                 out,
-                "\nwithout a node that lives: {}, {}, {studies} studies",
+                "\nwithout a node that lives: {}, {}, {}",
                 counted(rooms, "room"),
                 counted(tournaments, "tournament"),
+                counted(studies, "study"),
             )?;
         }
         out.flush()?;
@@ -228,12 +229,12 @@ impl Drain {
             return Err(format!("node {} has just left", node.id.0).into());
         }
         say(format_args!(
-            "node {} ({}) hands over {}, {} and {} studies, then stops",
+            "node {} ({}) hands over {}, {} and {}, then stops",
             node.id.0,
             node.info.name,
             counted(node.rooms, "room"),
             counted(node.tournaments, "tournament"),
-            node.studies,
+            counted(node.studies, "study"),
         ))?;
         Ok(())
     }

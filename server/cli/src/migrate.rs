@@ -86,11 +86,11 @@ impl Migrate {
             return Ok(ExitCode::SUCCESS);
         }
         say(format_args!(
-            "moved: {}, {} unfinished, {}, {} studies",
+            "moved: {}, {} unfinished, {}, {}",
             counted(moved.finished, "finished game"),
             moved.unfinished,
             counted(moved.tournaments, "tournament"),
-            moved.studies,
+            counted(moved.studies, "study"),
         ))?;
         if moved.unreadable > 0 {
             say(format_args!(

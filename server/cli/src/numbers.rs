@@ -17,10 +17,14 @@ pub fn grouped(number: u64) -> String {
     text
 }
 
-/// `1 turn`, `2 turns`, `1,000 turns`.
+/// `1 turn`, `2 turns`, `1,000 turns`, `2 studies`.
 pub fn counted(count: u64, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{} {what}{plural}", grouped(count))
+    let number = grouped(count);
+    match (count, what.strip_suffix("study")) {
+        (1, _) => format!("{number} {what}"),
+        (_, Some(before)) => format!("{number} {before}studies"),
+        (_, None) => format!("{number} {what}s"),
+    }
 }
 
 /// A difference with its sign: `+0.125`, `−0.125`.
@@ -49,6 +53,19 @@ pub fn seat_number(seat: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use crate::numbers::*;
+
+    #[test]
+    fn what_is_counted_has_its_number() {
+        for (count, what, expected) in [
+            (0, "turn", "0 turns"),
+            (1, "turn", "1 turn"),
+            (1_000, "day", "1,000 days"),
+            (1, "study", "1 study"),
+            (2, "study", "2 studies"),
+        ] {
+            assert_eq!(counted(count, what), expected);
+        }
+    }
 
     #[test]
     fn times_have_a_unit() {

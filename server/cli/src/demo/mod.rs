@@ -16,6 +16,7 @@ use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_record::jsonl;
 use clap::Args;
 
+use super::numbers::counted;
 use super::remote::{MAX_PACE_MS, named_agent};
 use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
@@ -103,9 +104,9 @@ impl Demo {
         if !self.agents.is_empty() && message.players.is_none() {
             let named = self.agents.len();
             if !(2..=MAX_PLAYERS).contains(&named) {
-                let plural = if named == 1 { "" } else { "s" };
                 return Err(format!(
-                    "--agents names {named} agent{plural}; name 2 to {MAX_PLAYERS}, for instance greedy,random"
+                    "--agents names {}; name 2 to {MAX_PLAYERS}, for instance greedy,random",
+                    counted(named as u64, "agent")
                 )
                 .into());
             }

@@ -268,7 +268,11 @@ fn in_words(rules: &RuleSet) -> Vec<Piece> {
     let points: Vec<String> = rules.points_slice().iter().map(u32::to_string).collect();
     let mut words = vec![
         stop_in_words(spec.stop),
-        format!("{} faces and {} jokers", spec.faces, spec.jokers),
+        format!(
+            "{} faces and {}",
+            spec.faces,
+            counted(spec.jokers.into(), "joker")
+        ),
         format!("{} cards each", rules.hand_size()),
         format!("{} points by place", points.join(", ")),
     ];

@@ -17,7 +17,8 @@ impl Narrator {
     /// Places, points and totals of a Shift.
     pub fn shift_ended(&mut self, end: &v1::ShiftEnded) -> String {
         let mut out = self.chain.close(&self.view);
-        let mut words = format!("{} pizzas, {} turns", end.pizzas, end.turns);
+        let pizzas = counted(end.pizzas.into(), "pizza");
+        let mut words = format!("{pizzas}, {}", counted(end.turns.into(), "turn"));
         if end.adjudicated {
             words.push_str("; stopped at the turn limit: fewest cards first");
         }

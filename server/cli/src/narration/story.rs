@@ -7,7 +7,7 @@ use chefshat_record::words;
 use super::text::{MAX_NAME, clean};
 use super::view::GameView;
 use crate::kind::kind_name;
-use crate::numbers::{ordinal, seat_number};
+use crate::numbers::{counted, ordinal, seat_number};
 
 /// Longest text of a referee, characters.
 const MAX_TEXT: usize = 200;
@@ -198,8 +198,8 @@ fn exchanged(view: &GameView, cards: &v1::CardsExchanged) -> String {
     let top = view.faces();
     let receiver = view.name(cards.receiver);
     if cards.cards.is_empty() {
-        let noun = if cards.count == 1 { "card" } else { "cards" };
-        return format!("gives {} {noun} to {receiver}", cards.count);
+        let cards = counted(cards.count.into(), "card");
+        return format!("gives {cards} to {receiver}");
     }
     let equal = cards.cards.chunk_by(|one, next| one == next);
     let named = equal.map(|equal| match (equal.len(), equal[0]) {

@@ -80,10 +80,8 @@ impl Delete {
                 counted(deleted.annotations, "annotation"),
             ))?;
             if deleted.studies > 0 {
-                say(match deleted.studies {
-                    1 => "its data in 1 study are deleted".to_owned(),
-                    count => format!("its data in {count} studies are deleted"),
-                })?;
+                let studies = counted(deleted.studies, "study");
+                say(format_args!("its data in {studies} are deleted"))?;
             }
         }
         check(&skipped, name)?;

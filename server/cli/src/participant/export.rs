@@ -122,10 +122,7 @@ impl Export {
                 counted(sheet.decisions, "decision"),
                 counted(sheet.expressions, "expression"),
                 counted(sheet.tournaments, "tournament"),
-                match sheet.studies {
-                    1 => "1 study".to_owned(),
-                    count => format!("{count} studies"),
-                },
+                counted(sheet.studies, "study"),
             ))?;
         }
         check(&skipped, name)?;

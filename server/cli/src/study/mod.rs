@@ -19,6 +19,7 @@ use serde_json::json;
 
 use self::connection::service;
 use super::connect::ServerArg;
+use super::numbers::counted;
 use super::secret_file::{SecretFile, write_all};
 use super::{CommandError, say};
 
@@ -145,15 +146,16 @@ impl Create {
         if let Some(address) = owner::open_address(&self.server.page(), study) {
             say(format_args!("open link    {address}"))?;
         }
+        let participants = study.settings.as_ref().map_or(0, |it| it.participants);
         say(format_args!(
             "seeds sha256 {}",
             hex::encode(&study.seeds_sha256)
         ))?;
         say(format_args!(
-            "each of {} participants has {} steps with {} games and at most {} for practice",
-            study.settings.as_ref().map_or(0, |it| it.participants),
-            study.steps,
-            study.games,
+            "each of {} has {} with {} and at most {} for practice",
+            counted(participants.into(), "participant"),
+            counted(study.steps.into(), "step"),
+            counted(study.games.into(), "game"),
             study.practice_games
         ))?;
         match study.settings.as_ref().and_then(|it| it.groups.as_ref()) {

@@ -392,7 +392,8 @@ impl Export {
         for (name, bytes) in files {
             say(format_args!("{name} ({bytes} bytes)"))?;
         }
-        say(format_args!("records/ ({} games)", records.len()))
+        let games = counted(records.len() as u64, "game");
+        say(format_args!("records/ ({games})"))
     }
 }
 
@@ -466,8 +467,9 @@ impl DeleteParticipant {
             return say(json!(deleted));
         }
         say(format_args!(
-            "the data of participant {} are deleted, with {} games",
-            self.number, deleted.games
+            "the data of participant {} are deleted, with {}",
+            self.number,
+            counted(deleted.games.into(), "game")
         ))
     }
 }
