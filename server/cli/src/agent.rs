@@ -19,7 +19,7 @@ use super::error::{plain, tell};
 use super::llm::LlmArgs;
 use super::player::{Player, PlayerArg, player_arg};
 use super::remote::{MAX_PACE_MS, RemoteAgent};
-use super::{CommandError, say};
+use super::{CommandError, say, ticket_file};
 use chefshat_server::convert::recorded_player;
 
 /// Play on a server as a built-in agent or a language model.
@@ -113,7 +113,10 @@ impl AgentCommand {
                 }
             };
             player.begin();
-            let played = client.play(ticket, player.agent()).await;
+            let played = client.play(ticket.as_str(), player.agent()).await;
+            if played.is_ok() {
+                ticket_file::forget(self.join_args.ticket_file(), &ticket);
+            }
             all_played &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
             all_played &= player.has_played();
             match self.json {
@@ -172,6 +175,7 @@ impl AgentCommand {
         let name = self.name.clone().unwrap_or(default_name);
         let kind = self.kind_of.unwrap_or(kind);
         *last_code = Some(code.clone());
+        let ticket_file = ticket_file::prepare(self.join_args.ticket_file())?;
         let joined = client
             .join(v1::JoinRoomRequest {
                 join_code: code,
@@ -192,11 +196,8 @@ impl AgentCommand {
         tell(format_args!(
             "{name} has seat {number}; {waits}plays to the end"
         ));
-        // The ticket grants the seat: it is shown only here, to the person who started the agent.
-        tell(format_args!(
-            "if this agent stops before the end of its game, resume its seat with --ticket {}",
-            joined.ticket
-        ));
+        let resumes = "if this agent stops before the end of its game, resume its seat";
+        ticket_file::keep(ticket_file, &joined.ticket, resumes);
         Ok(joined.ticket)
     }
 }

@@ -9,8 +9,8 @@ use chefshat_client::{Client, ConnectOptions, v1};
 use clap::Args;
 use tokio::time::{Instant, sleep};
 
-use super::CommandError;
 use super::error::tell;
+use super::{CommandError, ticket_file};
 
 /// Time to wait for a server or a file.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -171,16 +171,8 @@ impl OwnerArgs {
         if let Some(token) = self.owner_token.as_ref().filter(|it| !it.is_empty()) {
             return Ok(Some(token.clone()));
         }
-        let Some(file) = &self.owner_file else {
-            return Ok(None);
-        };
-        let name = file.display();
-        let text = std::fs::read_to_string(file);
-        let text = text.map_err(|error| format!("--owner-file: {name}: {error}"))?;
-        match text.trim() {
-            "" => Err(format!("--owner-file: {name} is empty").into()),
-            token => Ok(Some(token.to_owned())),
-        }
+        let file = self.owner_file.as_deref();
+        file.map(|file| secret_in(file, "--owner-file")).transpose()
     }
 
     /// The owner token, if there is one: of a flag, or else of the environment.
@@ -199,6 +191,20 @@ impl OwnerArgs {
     pub fn token(&self) -> Result<String, CommandError> {
         let token = self.given()?;
         token.ok_or_else(|| "give --owner-token or --owner-file".into())
+    }
+}
+
+/// The secret in a file that a flag names.
+///
+/// # Errors
+/// The file is unreadable or empty.
+pub(crate) fn secret_in(file: &Path, flag: &str) -> Result<String, CommandError> {
+    let name = file.display();
+    let text = std::fs::read_to_string(file);
+    let text = text.map_err(|error| format!("{flag}: {name}: {error}"))?;
+    match text.trim() {
+        "" => Err(format!("{flag}: {name} is empty").into()),
+        secret => Ok(secret.to_owned()),
     }
 }
 
@@ -221,6 +227,9 @@ pub struct SecretArgs {
         hide_env_values = true
     )]
     tickets: Vec<String>,
+    /// File with such a ticket. Repeatable.
+    #[arg(long = "ticket-file", value_name = "FILE")]
+    ticket_files: Vec<PathBuf>,
     #[command(flatten)]
     owner: OwnerArgs,
 }
@@ -229,7 +238,12 @@ impl SecretArgs {
     /// The secrets that are not empty.
     fn given(&self) -> Result<Vec<String>, CommandError> {
         let tickets = self.tickets.iter().filter(|ticket| !ticket.is_empty());
-        Ok(tickets.cloned().chain(self.owner.given()?).collect())
+        let mut secrets: Vec<String> = tickets.cloned().collect();
+        for file in &self.ticket_files {
+            secrets.push(secret_in(file, "--ticket-file")?);
+        }
+        secrets.extend(self.owner.given()?);
+        Ok(secrets)
     }
 }
 
@@ -242,18 +256,22 @@ impl fmt::Debug for SecretArgs {
 
 /// How to get a seat or place.
 #[derive(Debug, Args)]
-#[group(required = ticket_in_environment().is_none(), multiple = false)]
+#[group(required = ticket_in_environment().is_none(), multiple = true)]
 pub struct JoinArgs {
     /// Join code.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["code_file", "ticket"])]
     code: Option<String>,
     /// File with the join code; waits until it exists.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
     code_file: Option<PathBuf>,
     /// Ticket to resume with: of a seat or, in `tournament join`, of a place. CHEFSHAT_TICKET does the
     /// same, unless another flag says what to join, and does not show in lists of processes.
     #[arg(long)]
     ticket: Option<String>,
+    /// File that keeps the ticket, readable only by you, until the game or tournament is over, instead
+    /// of printing it. If it has a ticket, that is resumed, so that the same command can be run again.
+    #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
+    ticket_file: Option<PathBuf>,
 }
 
 /// How to get a seat or place.
@@ -275,14 +293,22 @@ impl JoinArgs {
     /// # Errors
     /// There is no code in time, or the file is unreadable.
     pub async fn pass(&self, last: Option<&str>) -> Result<Pass, CommandError> {
+        if let Some(kept) = ticket_file::kept(self.ticket_file())? {
+            return Ok(Pass::Ticket(kept));
+        }
         match (&self.ticket, &self.code, &self.code_file) {
             (Some(ticket), ..) => Ok(Pass::Ticket(ticket.clone())),
             (None, Some(code), _) => Ok(Pass::Code(code.clone())),
             (None, None, Some(file)) => Ok(Pass::Code(code_in(file, last).await?)),
             (None, None, None) => ticket_in_environment()
                 .map(Pass::Ticket)
-                .ok_or_else(|| "give --code, --code-file or --ticket".into()),
+                .ok_or_else(|| "there is no ticket yet: give --code or --code-file".into()),
         }
+    }
+
+    /// The file that keeps the ticket, if one was named.
+    pub(crate) fn ticket_file(&self) -> Option<&Path> {
+        self.ticket_file.as_deref()
     }
 }
 
@@ -380,9 +406,10 @@ mod tests {
         assert_eq!(typed.as_deref(), Some("typed"));
         let secrets = SecretArgs {
             tickets: vec![String::new(), "T".to_owned()],
+            ticket_files: vec![file],
             owner: OwnerArgs::default(),
         };
-        assert_eq!(secrets.given().expect("one"), ["T"]);
+        assert_eq!(secrets.given().expect("two"), ["T", "of the file"]);
     }
 
     #[test]

@@ -48,6 +48,7 @@ pub mod stops;
 mod study;
 mod table;
 pub mod threads;
+mod ticket_file;
 mod token;
 pub mod toml_file;
 mod tournament;

@@ -1,5 +1,7 @@
 //! The arguments of all commands about a physical table, and the connection to it.
 
+use std::path::PathBuf;
+
 use chefshat_client::v1::{self, table_report::Kind};
 use chefshat_client::{Backoff, Client, Error, TableFollower};
 use chefshat_room::ids::random_bytes;
@@ -8,7 +10,7 @@ use tokio::time::{Duration, Instant, sleep};
 use tonic::Code;
 
 use super::super::CommandError;
-use super::super::connect::{PATIENCE, ServerArg, TABLE_TICKET};
+use super::super::connect::{PATIENCE, ServerArg, TABLE_TICKET, secret_in};
 
 /// Time between two attempts to report.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -20,11 +22,14 @@ pub(super) struct TableArgs {
     // Optional in the type, since a subcommand has its own.
     #[arg(
         long,
-        required = true,
+        required_unless_present = "ticket_file",
         env = TABLE_TICKET,
         hide_env_values = true
     )]
     pub(super) ticket: Option<String>,
+    /// File with that ticket.
+    #[arg(long, value_name = "FILE")]
+    ticket_file: Option<PathBuf>,
     #[command(flatten)]
     server: ServerArg,
     /// Print states and verdicts as JSON lines.
@@ -36,11 +41,15 @@ impl TableArgs {
     /// Connects to the table.
     ///
     /// # Errors
-    /// The server does not answer, or the address is invalid.
+    /// The server does not answer, the address is invalid, or the file is unreadable.
     pub(super) async fn connect(self) -> Result<Table, CommandError> {
+        let ticket = match &self.ticket_file {
+            Some(file) => secret_in(file, "--ticket-file")?,
+            None => self.ticket.ok_or("give the table's --ticket")?,
+        };
         Ok(Table {
             client: self.server.connect().await?,
-            ticket: self.ticket.ok_or("give the table's --ticket")?,
+            ticket,
         })
     }
 }

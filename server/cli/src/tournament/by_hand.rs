@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use chefshat_client::{Client, v1};
 use clap::{ArgGroup, Args};
 
-use super::super::connect::{OwnerArgs, ServerArg, ticket_in_environment};
+use super::super::connect::{OwnerArgs, ServerArg, secret_in, ticket_in_environment};
 use super::super::secret_file::{SecretFile, write_all};
 use super::super::{CommandError, say};
 use super::list::game_in_a_line;
@@ -115,6 +115,9 @@ struct Asker {
     /// The participant's ticket. CHEFSHAT_TICKET does the same, unless a flag gives the owner token.
     #[arg(long)]
     ticket: Option<String>,
+    /// File with that ticket.
+    #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
+    ticket_file: Option<PathBuf>,
     #[command(flatten)]
     owner: OwnerArgs,
     #[command(flatten)]
@@ -138,6 +141,9 @@ impl Asker {
         let of_participant = |ticket| (ticket, String::new());
         if let Some(ticket) = self.ticket.clone().filter(|ticket| !ticket.is_empty()) {
             return Ok(of_participant(ticket));
+        }
+        if let Some(file) = &self.ticket_file {
+            return Ok(of_participant(secret_in(file, "--ticket-file")?));
         }
         if let Some(token) = self.owner.by_flag()? {
             return Ok(of_owner(token));

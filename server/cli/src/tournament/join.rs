@@ -18,7 +18,7 @@ use super::super::llm::LlmArgs;
 use super::super::numbers::counted;
 use super::super::player::{Player, PlayerArg, player_arg};
 use super::super::remote::MAX_PACE_MS;
-use super::super::{CommandError, say};
+use super::super::{CommandError, say, ticket_file};
 use super::tables::{NO_GAME_COUNTED, place_in_words};
 use super::words::state;
 
@@ -90,15 +90,17 @@ impl Join {
         // The tournament may be private.
         let client = client.with_secrets([&ticket])?;
         let played = client
-            .take_part(ticket, make, &PlayOptions::default())
+            .take_part(ticket.as_str(), make, &PlayOptions::default())
             .await;
         let (entered, outcomes) = played.map_err(|error| format!("the place was lost: {error}"))?;
+        ticket_file::forget(self.join_args.ticket_file(), &ticket);
         let ended = match entered {
             Some(place) => self.tell_end(&client, &place).await?,
-            // The ticket was that of a seat.
             None => {
                 let games = counted(outcomes.len() as u64, "game");
-                tell(format_args!("the tournament is over; played here: {games}"));
+                tell(format_args!(
+                    "the ticket was that of a seat; played here: {games}"
+                ));
                 ExitCode::SUCCESS
             }
         };
@@ -113,6 +115,7 @@ impl Join {
         let name = self.name.clone();
         let name = name.unwrap_or_else(|| self.agent.display_name(&self.llm));
         let kind = self.kind_of.unwrap_or(self.agent.kind());
+        let ticket_file = ticket_file::prepare(self.join_args.ticket_file())?;
         let joined = client
             .join_tournament(v1::JoinTournamentRequest {
                 join_code: code,
@@ -130,11 +133,8 @@ impl Join {
         tell(format_args!(
             "{name} takes part in tournament {id} as participant {participant}"
         ));
-        // The ticket grants the place: it is shown only here, to the person who started the agent.
-        tell(format_args!(
-            "if this agent stops before the tournament ends, resume its place with --ticket {}",
-            joined.ticket
-        ));
+        let resumes = "if this agent stops before the tournament ends, resume its place";
+        ticket_file::keep(ticket_file, &joined.ticket, resumes);
         Ok(joined.ticket)
     }
 

@@ -3,10 +3,11 @@
 
 use std::io::{BufRead as _, BufReader};
 
+use chefshat_client::Client;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Running, run, serve, typed, typed_into_a_closed_pipe};
+use super::run::{Running, in_runtime, run, serve, typed, typed_into_a_closed_pipe};
 
 /// The only line that an agent printed, as JSON.
 fn only_line(lines: &[String]) -> Value {
@@ -84,6 +85,38 @@ fn rooms_are_listed_shown_and_closed() {
     let code = made["join_code"].as_str().unwrap();
     let late = run(&url, &format!("agent greedy --code {code}"));
     assert_eq!(late.code, Some(1));
+}
+
+#[test]
+fn an_agent_keeps_its_ticket_in_a_file_until_the_game_is_over() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let file = folder.path().join("ticket");
+    let room = || {
+        let made = run(&url, "room create --seat greedy*3 --target-shifts 1 --json");
+        made.json()["join_code"].as_str().unwrap().to_owned()
+    };
+    let agent = |code: &str| {
+        let line = format!(
+            "agent random --code {code} --ticket-file {}",
+            file.display()
+        );
+        run(&url, &line).well()
+    };
+    let played = agent(&room());
+    assert!(!played.stderr.contains("--ticket"), "{played:?}");
+    assert!(!file.exists());
+    // One that was killed has left its ticket. The code is used up.
+    let code = room();
+    let joined = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        client.join_with_code(&*code, "Ada").await.unwrap()
+    });
+    std::fs::write(&file, format!("{}\n", joined.ticket)).unwrap();
+    agent(&code);
+    assert!(!file.exists());
+    let line = format!("agent random --ticket-file {}", file.display());
+    run(&url, &line).assert_failed("give --code or --code-file");
 }
 
 #[test]

@@ -41,6 +41,7 @@ use crate::error::tell;
 use crate::name_key::NameKeyArg;
 use crate::remote::named_agent;
 use crate::rules_args::{RulesArgs, rules_of};
+use crate::ticket_file;
 use crate::tui::screen::missing;
 use chefshat_server::host::Host;
 use ending::{Hints, print_end};
@@ -89,17 +90,21 @@ pub(crate) struct Play {
 
 /// How to get a seat.
 #[derive(Debug, Args)]
-#[group(required = ticket_in_environment().is_none(), multiple = false)]
+#[group(required = ticket_in_environment().is_none(), multiple = true)]
 struct SeatArgs {
     /// Join code of a room or tournament.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["ticket", "local"])]
     code: Option<String>,
     /// Ticket of a seat or place to resume. CHEFSHAT_TICKET does the same, unless another flag says what
     /// to play, and does not show in lists of processes.
     #[arg(long)]
     ticket: Option<String>,
+    /// File that keeps the ticket, readable only by you, until the game or tournament is over. If it has
+    /// one, you resume.
+    #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
+    ticket_file: Option<PathBuf>,
     /// Run a server in this process and play against built-in agents.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["ticket", "ticket_file"])]
     local: bool,
 }
 
@@ -122,7 +127,11 @@ impl Play {
         else {
             let taken = self.take().await?;
             let there = self.server.flags();
-            let back = self.server.with_ticket(TICKET, &taken.ticket, "play");
+            let file = self.seat.ticket_file.as_deref();
+            let back = match file {
+                Some(file) => format!("chefshat play {there} --ticket-file {}", file.display()),
+                None => self.server.with_ticket(TICKET, &taken.ticket, "play"),
+            };
             // It stays above the screen, whatever ends that.
             tell(format_args!("to resume: {back}"));
             let hints = Hints {
@@ -131,7 +140,12 @@ impl Play {
                 page: Some(self.server.page()),
                 record: Box::new(move |game| format!("chefshat records get {game} {there}")),
             };
-            return print_end(&play(taken, self.times).await?, &hints);
+            let ticket = taken.ticket.clone();
+            let part = play(taken, self.times).await?;
+            if part.has_result() {
+                ticket_file::forget(file, &ticket);
+            }
+            return print_end(&part, &hints);
         };
         let host = Host::in_memory(Some(data_dir.clone())).await?;
         let played = async { play(self.take_local(&host).await?, self.times).await }.await;
@@ -154,13 +168,22 @@ impl Play {
 
     async fn take(&self) -> Result<Taken, CommandError> {
         let client = self.server.connect().await?;
-        if let Some(code) = &self.seat.code {
-            return join::by_code(client, code, &self.name(), self.name_key.key()?).await;
+        let file = self.seat.ticket_file.as_deref();
+        let kept = ticket_file::kept(file)?;
+        if let (Some(code), None) = (&self.seat.code, &kept) {
+            let file = ticket_file::prepare(file)?;
+            let taken = join::by_code(client, code, &self.name(), self.name_key.key()?).await?;
+            if let Some(Err(error)) = file.map(|file| file.write(&taken.ticket)) {
+                let back = self.server.with_ticket(TICKET, &taken.ticket, "play");
+                tell(format_args!("{error}; to resume: {back}"));
+            }
+            return Ok(taken);
         }
-        let ticket = self.seat.ticket.clone().or_else(ticket_in_environment);
+        let ticket = kept.or_else(|| self.seat.ticket.clone());
+        let ticket = ticket.or_else(ticket_in_environment);
         Ok(Taken {
             client,
-            ticket: ticket.ok_or("give --code or --ticket")?,
+            ticket: ticket.ok_or("there is no ticket yet: give --code")?,
             game: None,
         })
     }

@@ -333,6 +333,15 @@ impl Part {
         }
     }
 
+    /// Whether the game or tournament has ended, so that its ticket is used up.
+    pub(super) fn has_result(&self) -> bool {
+        match (&self.lobby, &self.game) {
+            (Some(lobby), _) => lobby.is_over() || self.link == Link::Over(None),
+            (None, Some(game)) => game.table.end.is_some(),
+            (None, None) => false,
+        }
+    }
+
     /// Whether nothing more happens.
     pub(super) fn is_over(&self) -> bool {
         let ended = self.lobby.as_ref().is_some_and(Lobby::is_over);
