@@ -97,11 +97,7 @@ impl Client {
     pub async fn action_table(&self, faces: u32) -> Result<v1::GetActionTableResponse, Error> {
         let service = ServerServiceClient::new(self.channel());
         let request = v1::GetActionTableRequest { faces };
-        repeated(|| {
-            let mut service = service.clone();
-            async move { service.get_action_table(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().get_action_table(request).await }).await
     }
 
     /// Creates a room. The response has the join code for its participants and the token that
@@ -116,11 +112,7 @@ impl Client {
     ) -> Result<v1::CreateRoomResponse, Error> {
         let service = RoomServiceClient::new(self.channel());
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.create_room(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().create_room(request.clone()).await }).await
     }
 
     /// The public view of a room.
@@ -133,10 +125,7 @@ impl Client {
             room_id: room_id.into(),
             join_code: String::new(),
         };
-        let response = repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.get_room(request).await }
-        });
+        let response = repeated(|| async { service.clone().get_room(request.clone()).await });
         response
             .await?
             .room
@@ -165,11 +154,7 @@ impl Client {
         request: v1::ListRoomsRequest,
     ) -> Result<v1::ListRoomsResponse, Error> {
         let service = RoomServiceClient::new(self.channel());
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.list_rooms(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().list_rooms(request.clone()).await }).await
     }
 
     /// Takes a seat. The response has the ticket to play on it. If the response is lost, the call
@@ -184,11 +169,7 @@ impl Client {
     ) -> Result<v1::JoinRoomResponse, Error> {
         let service = RoomServiceClient::new(self.channel());
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.join_room(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().join_room(request.clone()).await }).await
     }
 
     /// Takes the first free seat of the room with this join code, as an agent.
@@ -237,11 +218,7 @@ impl Client {
     ) -> Result<v1::ListRecordsResponse, Error> {
         let service =
             RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.list_records(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().list_records(request.clone()).await }).await
     }
 
     /// The record of a game that has ended, line by line.
@@ -277,11 +254,7 @@ impl Client {
         let service =
             RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
         let request = v1::GetRecordRequest { game_id };
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.get_record(request).await }
-        })
-        .await
+        repeated(|| async { service.clone().get_record(request.clone()).await }).await
     }
 
     /// Puts a marker into the record of a room. Nobody but the owner of the room learns of it.
@@ -361,11 +334,8 @@ impl Client {
             ticket,
             command: Some(command),
         };
-        repeated(|| {
-            let (channel, request) = (self.channel(), request.clone());
-            async move { PlayServiceClient::new(channel).act(request).await }
-        })
-        .await
+        let service = PlayServiceClient::new(self.channel());
+        repeated(|| async { service.clone().act(request.clone()).await }).await
     }
 
     /// Watches a room from an event number on; 0 and 1 are the first event. Connects when the first

@@ -129,25 +129,22 @@ impl Client {
         service: &ServerServiceClient<crate::Connection>,
         room_id: &str,
     ) -> Result<ServerClock, Error> {
-        repeated(|| {
-            let mut service = service.clone();
-            let room_id = room_id.to_owned();
-            async move {
-                // The instants enclose the times of day, so that the round trip bounds the errors
-                // of both.
-                let sent = Moment {
-                    instant: Instant::now(),
-                    time_of_day: time_of_day(),
-                };
-                let request = v1::GetClockRequest { room_id };
-                let response = service.get_clock(request).await?;
-                let time_of_day = time_of_day();
-                let arrived = Moment {
-                    instant: Instant::now(),
-                    time_of_day,
-                };
-                Ok(response.map(|response| ServerClock::of(&response, sent, arrived)))
-            }
+        let request = v1::GetClockRequest {
+            room_id: room_id.to_owned(),
+        };
+        repeated(|| async {
+            // The instants enclose the times of day, so that the round trip bounds the errors of both.
+            let sent = Moment {
+                instant: Instant::now(),
+                time_of_day: time_of_day(),
+            };
+            let response = service.clone().get_clock(request.clone()).await?;
+            let time_of_day = time_of_day();
+            let arrived = Moment {
+                instant: Instant::now(),
+                time_of_day,
+            };
+            Ok(response.map(|response| ServerClock::of(&response, sent, arrived)))
         })
         .await
     }

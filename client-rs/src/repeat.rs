@@ -101,19 +101,21 @@ mod tests {
             include_str!("tournaments/by_hand.rs"),
             include_str!("table.rs"),
         ];
-        let lines: Vec<&str> = sources.iter().flat_map(|source| source.lines()).collect();
-        let mut repeated = Vec::new();
-        for (index, line) in lines.iter().enumerate() {
-            let names = [".get_", ".list_"].map(|start| line.split_once(start));
-            if names.iter().all(Option::is_none) || !line.contains(".await") {
-                continue;
-            }
-            match lines[index - 2].trim_end().ends_with("repeated(|| {") {
-                true => repeated.push(*line),
-                false => assert!(line.contains(".get_server_info("), "{line}"),
+        let mut repeated = 0;
+        for source in sources {
+            let source: String = source.split_whitespace().collect();
+            let calls = [".get_", ".list_"].map(|name| source.match_indices(name));
+            for (at, _) in calls.into_iter().flatten() {
+                let (before, call) = source.split_at(at);
+                let services = ["service.clone()", "service(self)"].into_iter();
+                let service = services.filter_map(|it| before.strip_suffix(it)).next();
+                match service.is_some_and(|before| before.ends_with("repeated(||async{")) {
+                    true => repeated += 1,
+                    false => assert!(call.starts_with(".get_server_info("), "{call}"),
+                }
             }
         }
-        assert_eq!(repeated.len(), 11, "{repeated:#?}");
+        assert_eq!(repeated, 11);
     }
 
     #[tokio::test]

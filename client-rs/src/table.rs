@@ -56,10 +56,7 @@ impl Client {
             report: Some(report),
         };
         let service = service(self);
-        repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.report(request).await }
-        })
+        repeated(|| async { service.clone().report(request.clone()).await })
         .await
     }
 

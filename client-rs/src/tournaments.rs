@@ -1,5 +1,5 @@
 //! Tournaments: calls, following a tournament, and taking part in one. `by_hand` has the calls that
-//! change a running tournament; `participant` processes the updates of a participant.
+//! change a running tournament.
 
 mod by_hand;
 
@@ -31,10 +31,7 @@ impl Client {
             ..Default::default()
         };
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.create_tournament(request).await }
-        })
+        repeated(|| async { service(self).create_tournament(request.clone()).await })
         .await
     }
 
@@ -50,10 +47,7 @@ impl Client {
             tournament_id: tournament_id.into(),
             join_code: String::new(),
         };
-        let response = repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.get_tournament(request).await }
-        });
+        let response = repeated(|| async { service(self).get_tournament(request.clone()).await });
         one(response.await?.tournament)
     }
 
@@ -65,10 +59,7 @@ impl Client {
         &self,
         request: v1::ListTournamentsRequest,
     ) -> Result<v1::ListTournamentsResponse, Error> {
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.list_tournaments(request).await }
-        })
+        repeated(|| async { service(self).list_tournaments(request.clone()).await })
         .await
     }
 
@@ -85,10 +76,7 @@ impl Client {
         mut request: v1::JoinTournamentRequest,
     ) -> Result<v1::JoinTournamentResponse, Error> {
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.join_tournament(request).await }
-        })
+        repeated(|| async { service(self).join_tournament(request.clone()).await })
         .await
     }
 
@@ -104,10 +92,7 @@ impl Client {
         mut request: v1::AddTableParticipantRequest,
     ) -> Result<v1::AddTableParticipantResponse, Error> {
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.add_table_participant(request).await }
-        })
+        repeated(|| async { service(self).add_table_participant(request.clone()).await })
         .await
     }
 
@@ -127,10 +112,7 @@ impl Client {
             owner_token: owner_token.into(),
             game,
         };
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.get_physical_table(request).await }
-        })
+        repeated(|| async { service(self).get_physical_table(request.clone()).await })
         .await
     }
 
@@ -179,10 +161,7 @@ impl Client {
         let request = v1::GetTournamentResultsRequest {
             tournament_id: tournament_id.into(),
         };
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.get_tournament_results(request).await }
-        })
+        repeated(|| async { service(self).get_tournament_results(request.clone()).await })
         .await
     }
 
@@ -194,10 +173,7 @@ impl Client {
         &self,
         request: v1::ListTournamentGamesRequest,
     ) -> Result<v1::ListTournamentGamesResponse, Error> {
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.list_tournament_games(request).await }
-        })
+        repeated(|| async { service(self).list_tournament_games(request.clone()).await })
         .await
     }
 
@@ -209,10 +185,7 @@ impl Client {
         &self,
         request: v1::GetLeaderboardRequest,
     ) -> Result<v1::GetLeaderboardResponse, Error> {
-        repeated(|| {
-            let (mut service, request) = (service(self), request);
-            async move { service.get_leaderboard(request).await }
-        })
+        repeated(|| async { service(self).get_leaderboard(request).await })
         .await
     }
 

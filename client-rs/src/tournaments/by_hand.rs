@@ -56,11 +56,7 @@ impl Client {
             return Ok(response.into_inner());
         }
         identify(&mut request.request_id);
-        repeated(|| {
-            let (mut service, request) = (service(self), request.clone());
-            async move { service.replace_participant(request).await }
-        })
-        .await
+        repeated(|| async { service(self).replace_participant(request.clone()).await }).await
     }
 
     /// Pauses a tournament: no game is called until it is resumed. Games in progress continue.

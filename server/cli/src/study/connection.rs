@@ -21,15 +21,11 @@ pub(super) async fn get_study(
     study_id: &str,
     owner_token: &str,
 ) -> Result<v1::GetStudyResponse, Error> {
-    repeated(|| {
-        let mut service = service.clone();
-        let request = v1::GetStudyRequest {
-            study_id: study_id.to_owned(),
-            owner_token: owner_token.to_owned(),
-        };
-        async move { service.get_study(request).await }
-    })
-    .await
+    let request = v1::GetStudyRequest {
+        study_id: study_id.to_owned(),
+        owner_token: owner_token.to_owned(),
+    };
+    repeated(|| async { service.clone().get_study(request.clone()).await }).await
 }
 
 /// A refusal, for people.

@@ -113,10 +113,7 @@ impl Create {
             settings: Some(settings),
             request_id: random_bytes::<32>().to_vec(),
         };
-        let created = repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.create_study(request).await }
-        });
+        let created = repeated(|| async { service.clone().create_study(request.clone()).await });
         let created = created.await?;
         let study = created.study.ok_or("the server did not return the study")?;
         let owner = created.owner_token;

@@ -169,10 +169,7 @@ impl List {
         let owner_tokens = self.owner.given()?.into_iter().collect();
         let service = service(&self.server).await?;
         let request = v1::ListStudiesRequest { owner_tokens };
-        let listed = repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.list_studies(request).await }
-        });
+        let listed = repeated(|| async { service.clone().list_studies(request.clone()).await });
         let studies = listed.await?.studies;
         if studies.is_empty() && !self.json {
             return say("no studies");
@@ -215,10 +212,8 @@ impl Links {
                 study_id,
                 owner_token,
             };
-            let listed = repeated(|| {
-                let (mut service, request) = (service.clone(), request.clone());
-                async move { service.list_study_links(request).await }
-            });
+            let listed =
+                repeated(|| async { service.clone().list_study_links(request.clone()).await });
             listed.await?.links
         } else {
             let request = v1::AddStudyParticipantsRequest {
@@ -362,10 +357,7 @@ impl Export {
             owner_token: owned.owner.token()?,
             test: self.test,
         };
-        let exported = repeated(|| {
-            let (mut service, request) = (service.clone(), request.clone());
-            async move { service.export_study(request).await }
-        });
+        let exported = repeated(|| async { service.clone().export_study(request.clone()).await });
         let mut parts = exported.await?;
         let mut sizes: BTreeMap<String, u64> = BTreeMap::new();
         let mut open: Option<(String, File)> = None;
