@@ -2,10 +2,11 @@
 //! join code.
 
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use chefshat_client::{Client, ConnectOptions, v1};
+use chefshat_client::{Backoff, Client, ConnectOptions, Error, v1};
 use clap::Args;
 use tokio::time::{Instant, sleep};
 
@@ -20,6 +21,8 @@ pub(crate) const TICKET: &str = "CHEFSHAT_TICKET";
 pub(crate) const TABLE_TICKET: &str = "CHEFSHAT_TABLE_TICKET";
 /// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
+/// The client's reason if no server answers.
+const CONNECT_FAILED: &str = "CONNECT_FAILED";
 
 /// The server, and what it takes to be let in.
 #[derive(Clone, Args)]
@@ -85,7 +88,7 @@ impl ServerArg {
         }
     }
 
-    async fn attempt(&self) -> Result<Client, chefshat_client::Error> {
+    async fn attempt(&self) -> Result<Client, Error> {
         let options = ConnectOptions {
             token: self.token.clone().filter(|token| !token.is_empty()),
             ca: self.ca.clone(),
@@ -99,7 +102,7 @@ impl ServerArg {
     /// The server does not answer or is not trusted, or an argument is invalid.
     pub async fn connect(&self) -> Result<Client, CommandError> {
         self.attempt().await.map_err(|error| match error.reason() {
-            Some("CONNECT_FAILED") => {
+            Some(CONNECT_FAILED) => {
                 let hint = "start one there with `chefshat serve`, or name another with --server";
                 format!("{}; {hint}", error.message()).into()
             }
@@ -121,32 +124,46 @@ impl ServerArg {
     /// # Errors
     /// The last failure.
     pub async fn connect_patiently(&self) -> Result<Client, CommandError> {
-        let give_up_at = Instant::now() + PATIENCE;
-        let mut announced = false;
-        loop {
-            match self.attempt().await {
-                Ok(client) => return Ok(client),
-                Err(error) if error.reason() == Some("CONNECT_FAILED") => {
-                    if Instant::now() + PAUSE > give_up_at {
-                        let waited = PATIENCE.as_secs();
-                        return Err(format!(
-                            "{}; no answer for {waited} seconds; check that `chefshat serve` is running there",
-                            error.message()
-                        )
-                        .into());
-                    }
-                    if !std::mem::replace(&mut announced, true) {
-                        let patience = PATIENCE.as_secs();
-                        tell(format_args!(
-                            "no answer from {} yet; retrying for up to {patience} seconds",
-                            self.server
-                        ));
-                    }
-                }
-                Err(error) => return Err(error.message().to_owned().into()),
-            }
-            sleep(PAUSE).await;
+        let is_away = |error: &Error| error.reason() == Some(CONNECT_FAILED);
+        let patience = PATIENCE.as_secs();
+        let notice = || {
+            tell(format_args!(
+                "no answer from {} yet; retrying for up to {patience} seconds",
+                self.server
+            ));
+        };
+        let connected = patiently(PAUSE, async || self.attempt().await, is_away, notice).await;
+        connected.map_err(|error| match (error.message(), is_away(&error)) {
+            (message, true) => format!(
+                "{message}; no answer for {patience} seconds; check that `chefshat serve` is running there"
+            )
+            .into(),
+            (message, false) => message.into(),
+        })
+    }
+}
+
+/// Repeats an attempt whose failure passes, for [`PATIENCE`]. `notice`: before the first repetition.
+///
+/// # Errors
+/// The last failure.
+pub(crate) async fn patiently<T, E>(
+    pause: Duration,
+    attempt: impl AsyncFn() -> Result<T, E>,
+    passes: impl Fn(&E) -> bool,
+    notice: impl FnOnce(),
+) -> Result<T, E> {
+    let give_up_at = Instant::now() + PATIENCE;
+    let mut notice = Some(notice);
+    loop {
+        match attempt().await {
+            Err(error) if passes(&error) && Instant::now() + pause <= give_up_at => {}
+            done => return done,
         }
+        if let Some(notice) = notice.take() {
+            notice();
+        }
+        sleep(pause).await;
     }
 }
 
@@ -328,36 +345,39 @@ pub(crate) fn in_environment(name: &str) -> Option<String> {
 /// # Errors
 /// There is none in time, or the file is unreadable.
 async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError> {
-    let give_up_at = Instant::now() + PATIENCE;
-    let mut announced = false;
-    loop {
-        match std::fs::read_to_string(file) {
-            Ok(text) if !text.trim().is_empty() && last != Some(text.trim()) => {
-                return Ok(text.trim().to_owned());
-            }
-            Ok(_) => {}
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(format!("cannot read {}: {error}", file.display()).into()),
+    let (name, patience) = (file.display(), PATIENCE.as_secs());
+    let (another, other) = match last {
+        Some(_) => ("another", " other"),
+        None => ("a", ""),
+    };
+    // Without a code there is no failure, but something to wait for.
+    let read = async || match std::fs::read_to_string(file) {
+        Ok(text) if !text.trim().is_empty() && last != Some(text.trim()) => {
+            Ok(text.trim().to_owned())
         }
-        let patience = PATIENCE.as_secs();
-        let what = match last {
-            Some(_) => "another join code",
-            None => "a join code",
-        };
-        if Instant::now() + PAUSE > give_up_at {
-            return Err(format!(
-                "there was no {what} in {} for {patience} seconds; `create --code-file` of `chefshat room` or `chefshat tournament` writes one",
-                file.display()
-            )
-            .into());
-        }
-        if !std::mem::replace(&mut announced, true) {
-            tell(format_args!(
-                "waiting for {what} in {} for up to {patience} seconds",
-                file.display()
-            ));
-        }
-        sleep(PAUSE).await;
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Some(error)),
+        _ => Err(None),
+    };
+    let notice = || {
+        tell(format_args!(
+            "waiting for {another} join code in {name} for up to {patience} seconds"
+        ));
+    };
+    let found = patiently(PAUSE, read, Option::is_none, notice).await;
+    found.map_err(|unreadable| match unreadable {
+        Some(error) => format!("cannot read {name}: {error}").into(),
+        None => format!(
+            "there was no{other} join code in {name} for {patience} seconds; `create --code-file` of `chefshat room` or `chefshat tournament` writes one"
+        )
+        .into(),
+    })
+}
+
+/// How long a command that follows something tries to get a lost connection back.
+pub(crate) fn patience() -> Backoff {
+    Backoff {
+        give_up_after: PATIENCE,
+        ..Backoff::default()
     }
 }
 
@@ -374,6 +394,8 @@ pub fn attendant_link(page: &str, room_id: &str, ticket: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
 
     #[test]
@@ -410,6 +432,35 @@ mod tests {
             owner: OwnerArgs::default(),
         };
         assert_eq!(secrets.given().expect("two"), ["T", "of the file"]);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_passes_is_tried_again_but_not_for_ever() {
+        let (attempts, notices) = (Cell::new(0_u32), Cell::new(0));
+        let after = async |failures: u32, passes: bool| {
+            attempts.set(0);
+            let attempt = async || {
+                attempts.set(attempts.get() + 1);
+                match attempts.get() > failures {
+                    true => Ok(()),
+                    false => Err("no"),
+                }
+            };
+            let second = Duration::from_secs(1);
+            patiently(
+                second,
+                attempt,
+                |_| passes,
+                || notices.set(notices.get() + 1),
+            )
+            .await
+        };
+        assert_eq!(after(8, true).await, Ok(()));
+        assert_eq!((attempts.get(), notices.take()), (9, 1));
+        assert_eq!(after(u32::MAX, true).await, Err("no"));
+        assert_eq!(u64::from(attempts.get()), PATIENCE.as_secs() + 1);
+        assert_eq!(after(1, false).await, Err("no"));
+        assert_eq!((attempts.get(), notices.get()), (1, 1));
     }
 
     #[test]

@@ -4,12 +4,12 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use chefshat_client::v1::game_event::Kind;
-use chefshat_client::{Backoff, Error, Watched};
+use chefshat_client::{Error, Watched};
 use clap::Args;
 use serde::Serialize;
 
 use super::super::CommandError;
-use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
+use super::super::connect::{PATIENCE, SecretArgs, ServerArg, patience};
 use super::show::beginning;
 use crate::narration::{Narrator, clean, heading};
 
@@ -53,12 +53,8 @@ impl Watch {
             }
         }
         let mut narrator = Narrator::of_room(&room);
-        let mut spectator = client
-            .spectate(self.room_id.clone(), 1)
-            .with_backoff(Backoff {
-                give_up_after: PATIENCE,
-                ..Backoff::default()
-            });
+        let spectator = client.spectate(self.room_id.clone(), 1);
+        let mut spectator = spectator.with_backoff(patience());
         let mut end = None;
         loop {
             let event = match spectator.next_watched().await {

@@ -1,16 +1,16 @@
 //! The arguments of all commands about a physical table, and the connection to it.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use chefshat_client::v1::{self, table_report::Kind};
-use chefshat_client::{Backoff, Client, Error, TableFollower};
+use chefshat_client::{Client, Error, TableFollower};
 use chefshat_room::ids::random_bytes;
 use clap::Args;
-use tokio::time::{Duration, Instant, sleep};
 use tonic::Code;
 
 use super::super::CommandError;
-use super::super::connect::{PATIENCE, ServerArg, TABLE_TICKET, secret_in};
+use super::super::connect::{ServerArg, TABLE_TICKET, patience, patiently, secret_in};
 
 /// Time between two attempts to report.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -64,10 +64,7 @@ impl Table {
     /// Follows the state of the table.
     pub(super) fn follow(&self) -> TableFollower {
         let follower = self.client.follow_table(&self.ticket);
-        follower.with_backoff(Backoff {
-            give_up_after: PATIENCE,
-            ..Backoff::default()
-        })
+        follower.with_backoff(patience())
     }
 
     /// Reports what an attendant saw, again and again while the server is away, as the states are
@@ -82,32 +79,14 @@ impl Table {
             ..v1::TableReport::default()
         };
         let id = hex::encode(random_bytes::<16>());
-        patiently(PATIENCE, PAUSE, || {
-            (self.client).report_with_id(self.ticket.as_str(), id.as_str(), report.clone())
-        })
-        .await
-    }
-}
-
-/// Repeats a report for some time, unless the server refuses it.
-async fn patiently<T, F>(
-    patience: Duration,
-    pause: Duration,
-    report: impl Fn() -> F,
-) -> Result<T, Error>
-where
-    F: Future<Output = Result<T, Error>>,
-{
-    let give_up_at = Instant::now() + patience;
-    loop {
-        match report().await {
-            Err(error)
-                if error.may_retry() && !is_passing(&error) && Instant::now() < give_up_at =>
-            {
-                sleep(pause).await;
-            }
-            result => return result,
-        }
+        let send = async || {
+            let (ticket, id) = (self.ticket.as_str(), id.as_str());
+            (self.client)
+                .report_with_id(ticket, id, report.clone())
+                .await
+        };
+        let is_away = |error: &Error| error.may_retry() && !is_passing(error);
+        patiently(PAUSE, send, is_away, || {}).await
     }
 }
 
@@ -119,8 +98,6 @@ pub(super) fn is_passing(error: &Error) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
-
     use tonic::Status;
     use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -148,30 +125,5 @@ mod tests {
         ] {
             assert_eq!(is_passing(&error(code, reason)), expected, "{reason}");
         }
-    }
-
-    #[tokio::test]
-    async fn a_report_waits_for_a_server_that_is_away_but_not_for_ever() {
-        let sent = Cell::new(0);
-        let answered = |patience, refusals: u32, code, reason| {
-            sent.set(0);
-            let sent = &sent;
-            patiently(patience, Duration::ZERO, move || {
-                sent.set(sent.get() + 1);
-                let answer = match sent.get() > refusals {
-                    true => Ok(sent.get()),
-                    false => Err(error(code, reason)),
-                };
-                std::future::ready(answer)
-            })
-        };
-        let (hour, gone) = (Duration::from_secs(3_600), Code::Unavailable);
-        let back = answered(hour, 8, gone, "ROOM_GONE").await;
-        assert_eq!(back.expect("it is back"), 9);
-        let too_long = answered(Duration::ZERO, 8, gone, "ROOM_GONE").await;
-        too_long.expect_err("given up");
-        let full = answered(hour, 8, Code::ResourceExhausted, "TOO_MANY_QUESTIONS").await;
-        full.expect_err("refused");
-        assert_eq!(sent.get(), 1);
     }
 }

@@ -5,11 +5,11 @@ use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use chefshat_client::{Backoff, v1};
+use chefshat_client::v1;
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::super::connect::{PATIENCE, SecretArgs, ServerArg};
+use super::super::connect::{SecretArgs, ServerArg, patience};
 use super::super::{CommandError, progress, say};
 use super::tables::{self, Field};
 use super::words::{is_over, state, time_in_words};
@@ -45,12 +45,8 @@ pub(super) struct Follow {
 impl Follow {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect_with(&self.secrets).await?;
-        let mut follower = client
-            .follow_tournament(self.tournament_id)
-            .with_backoff(Backoff {
-                give_up_after: PATIENCE,
-                ..Backoff::default()
-            });
+        let follower = client.follow_tournament(self.tournament_id);
+        let mut follower = follower.with_backoff(patience());
         let mut display = Display::new(self.json)?;
         let mut end = None;
         while let Some(report) = follower.next().await? {

@@ -12,22 +12,19 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use chefshat_client::v1::{self, record_line};
-use chefshat_client::{Backoff, Client, Spectator, Watched};
+use chefshat_client::{Client, Error, Spectator, Watched};
 use chefshat_record::jsonl;
 use chefshat_record::replay::{ReplayError, replay};
 use clap::Args;
-use tokio::sync::mpsc;
 
 use crate::CommandError;
-use crate::connect::{PATIENCE, SecretArgs, ServerArg};
+use crate::connect::{SecretArgs, ServerArg, patience};
 use crate::narration::story;
 use crate::narration::view::GameView;
 use crate::tui::screen::{Screen, Wake, missing};
 use crate::tui::theme::Theme;
 use reel::Reel;
 
-/// Events that may wait to be shown.
-const EVENTS: usize = 256;
 /// Time between two ticks.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -95,12 +92,8 @@ impl Watch {
         {
             return Ok((of_record(lines)?, None));
         }
-        let spectator = client
-            .spectate(room.room_id.as_str(), 1)
-            .with_backoff(Backoff {
-                give_up_after: PATIENCE,
-                ..Backoff::default()
-            });
+        let spectator = client.spectate(room.room_id.as_str(), 1);
+        let spectator = spectator.with_backoff(patience());
         Ok((Reel::live(GameView::of_room(&room)), Some(spectator)))
     }
 }
@@ -136,9 +129,8 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
 }
 
 /// Shows the reel until the person quits.
-async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, CommandError> {
+async fn show(mut reel: Reel, mut live: Option<Spectator>) -> Result<ExitCode, CommandError> {
     let theme = Theme::of_environment();
-    let mut following = live.map(follow);
     let mut screen = Screen::open(TICK)?;
     let mut dirty = true;
     while !reel.left {
@@ -153,7 +145,7 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
                 }
                 Wake::Tick => dirty = reel.tick(screen.now_ms()),
             },
-            event = next(&mut following) => {
+            event = next(&mut live) => {
                 dirty = true;
                 match event {
                     Some(Ok(Watched::Event(event))) => reel.push(*event),
@@ -164,7 +156,7 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
                     over => {
                         let why = over.and_then(Result::err);
                         reel.close(why.map(|error| error.message().to_owned()));
-                        following = None;
+                        live = None;
                     }
                 }
             }
@@ -173,28 +165,10 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
     Ok(ExitCode::SUCCESS)
 }
 
-/// What is learnt of a room, or why no more follows.
-type PartInput = Result<Watched, chefshat_client::Error>;
-
-/// Follows the room in a separate task: keys and ticks would otherwise cancel its connection
-/// attempts.
-fn follow(mut spectator: Spectator) -> mpsc::Receiver<PartInput> {
-    let (sender, heard) = mpsc::channel(EVENTS);
-    tokio::spawn(async move {
-        while let Some(event) = spectator.next_watched().await.transpose() {
-            let over = event.is_err();
-            if sender.send(event).await.is_err() || over {
-                return;
-            }
-        }
-    });
-    heard
-}
-
-/// The next event of the room; pending forever without one.
-async fn next(following: &mut Option<mpsc::Receiver<PartInput>>) -> Option<PartInput> {
-    match following {
-        Some(heard) => heard.recv().await,
+/// What is learnt next of a room, or why no more follows; pending forever without one. Cancel safe.
+async fn next(live: &mut Option<Spectator>) -> Option<Result<Watched, Error>> {
+    match live {
+        Some(spectator) => spectator.next_watched().await.transpose(),
         None => std::future::pending().await,
     }
 }
