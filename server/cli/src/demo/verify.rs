@@ -1,11 +1,9 @@
-//! Verifies the deals of a finished game: the revealed seed matches the commitment made before the
-//! game (or the requested seed), it contains the agents' entropy, and each recorded hand follows
-//! from it.
+//! Verifies a finished game against what was said before it: its record replays, which includes every
+//! deal and the revealed seed; that seed is the one committed to, or the requested one; and it contains
+//! the agents' entropy.
 
 use chefshat_client::{Outcome, v1};
-use chefshat_engine::{Deal, RuleSet, Seed};
-use chefshat_engine::{MAX_ENTROPY, SeedPlan};
-use chefshat_record::convert::{rules_from_proto, seat_cards};
+use chefshat_record::replay::replay;
 use v1::game_event::Kind;
 use v1::record_line::Line;
 
@@ -37,7 +35,7 @@ impl Checked {
 /// Why the verification failed.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the deals cannot be verified: {0}")]
-pub(super) struct Unproven(&'static str);
+pub(super) struct Unproven(String);
 
 /// Verifies a record against the commitment, the requested seed if any, and each agent's entropy.
 pub(super) fn check(
@@ -46,135 +44,92 @@ pub(super) fn check(
     asked: Option<[u8; 32]>,
     outcomes: &[Outcome],
 ) -> Result<Checked, Unproven> {
-    let mut rules = None;
-    let mut game_id = String::new();
-    let mut shifts = Vec::new();
-    let mut reveal = None;
+    let unproven = |why: &str| Unproven(why.to_owned());
+    replay(record).map_err(|error| Unproven(error.to_string()))?;
+    let (mut committed_to, mut deals, mut reveal) = (&[][..], 0, None);
     for line in record.iter().filter_map(|line| line.line.as_ref()) {
         match line {
-            Line::Header(header) => {
-                rules = header
-                    .rules
-                    .as_ref()
-                    .and_then(|rules| rules_from_proto(rules).ok());
-                game_id.clone_from(&header.game_id);
-            }
+            Line::Header(header) => committed_to = &header.seed_commitment,
             Line::Event(event) => match &event.kind {
-                Some(Kind::ShiftStarted(start)) => shifts.push(start),
+                Some(Kind::ShiftStarted(_)) => deals += 1,
                 Some(Kind::GameEnded(end)) => reveal = end.reveal.as_ref(),
                 _ => {}
             },
             _ => {}
         }
     }
-    let rules = rules.ok_or(Unproven("the record has no rules"))?;
-    let reveal = reveal.ok_or(Unproven("the record has no seed"))?;
-    let seed: [u8; 32] = exactly(&reveal.game_seed).ok_or(Unproven("the seed is not 32 bytes"))?;
-    match asked {
-        Some(asked) if asked == seed => {}
-        Some(_) => return Err(Unproven("the seed is not the requested one")),
-        None => check_commitment(reveal, &game_id, commitment, seed, outcomes)?,
-    }
-    for start in &shifts {
-        check_deal(&rules, Seed(seed), start)?;
-    }
-    if shifts.is_empty() {
-        return Err(Unproven("nothing was dealt"));
-    }
-    Ok(Checked {
-        deals: shifts.len(),
-        committed: asked.is_none(),
-    })
-}
-
-fn check_commitment(
-    reveal: &v1::SeedReveal,
-    game_id: &str,
-    commitment: &[u8],
-    seed: [u8; 32],
-    outcomes: &[Outcome],
-) -> Result<(), Unproven> {
-    let short = Unproven("the revealed values have the wrong length");
-    let (Some(server_seed), Some(nonce)) = (exactly(&reveal.server_seed), exactly(&reveal.nonce))
-    else {
-        return Err(short);
-    };
-    let mut id = [0; 16];
-    hex::decode_to_slice(game_id, &mut id).map_err(|_| Unproven("the game's id cannot be read"))?;
-    let plan = SeedPlan::Committed { server_seed, nonce };
-    if plan.commitment(&id).as_ref().map(<[u8; 32]>::as_slice) != Some(commitment) {
-        return Err(Unproven("the revealed seed is not the one committed to"));
-    }
-    let entropy = &reveal.seat_entropy;
-    if entropy.iter().any(|bytes| bytes.len() > MAX_ENTROPY) {
-        return Err(short);
-    }
-    let counted = |outcome: &Outcome| {
+    let reveal = reveal.ok_or_else(|| unproven("the record has no seed"))?;
+    let is_in_seed = |outcome: &Outcome| {
         let seat = usize::try_from(outcome.seat).unwrap_or(usize::MAX);
-        entropy.get(seat) == Some(&outcome.entropy)
+        reveal.seat_entropy.get(seat) == Some(&outcome.entropy)
     };
-    if !outcomes.iter().all(counted) {
-        return Err(Unproven("an agent's own bytes are not in the seed"));
+    match asked {
+        Some(asked) if reveal.game_seed != asked => {
+            Err(unproven("the seed is not the requested one"))
+        }
+        None if commitment.is_empty() || committed_to != commitment => {
+            Err(unproven("the revealed seed is not the one committed to"))
+        }
+        None if !outcomes.iter().all(is_in_seed) => {
+            Err(unproven("an agent's own bytes are not in the seed"))
+        }
+        _ => Ok(Checked {
+            deals,
+            committed: asked.is_none(),
+        }),
     }
-    if plan.game_seed(entropy).0 != seed {
-        return Err(Unproven("the game seed does not follow from its parts"));
-    }
-    Ok(())
-}
-
-/// Whether the hands of a Shift are those the seed deals.
-fn check_deal(rules: &RuleSet, seed: Seed, start: &v1::ShiftStarted) -> Result<(), Unproven> {
-    let deal = Deal::new(rules, seed, start.shift);
-    let hands: Vec<v1::SeatCards> = deal
-        .hands()
-        .iter()
-        .map(|(seat, cards)| seat_cards(seat, *cards, rules.faces()))
-        .collect();
-    if hands == start.hands {
-        Ok(())
-    } else {
-        Err(Unproven("a hand does not follow from the seed"))
-    }
-}
-
-fn exactly(bytes: &[u8]) -> Option<[u8; 32]> {
-    bytes.try_into().ok()
 }
 
 #[cfg(test)]
 mod tests {
     use chefshat_client::Ending;
-    use chefshat_engine::RuleSetSpec;
-    use chefshat_record::convert::rules_to_proto;
 
     use crate::demo::verify::*;
+    use crate::tui::testing::lines;
 
-    /// A game with what was promised and what was recorded.
+    /// A recorded game with what was said before it.
     #[derive(Clone)]
     struct Game {
+        record: Vec<v1::RecordLine>,
         commitment: Vec<u8>,
         asked: Option<[u8; 32]>,
         outcomes: Vec<Outcome>,
-        reveal: v1::SeedReveal,
-        hands: Vec<v1::SeatCards>,
     }
 
-    const ID: [u8; 16] = [0xab; 16];
+    impl Game {
+        fn checked(&self) -> Result<Checked, Unproven> {
+            check(&self.record, &self.commitment, self.asked, &self.outcomes)
+        }
 
-    fn dealt(seed: Seed) -> Vec<v1::SeatCards> {
-        let rules = RuleSetSpec::default().validate().expect("the standard");
-        let hands = Deal::new(&rules, seed, 1).hands();
-        let cards = |(seat, cards): (_, &_)| seat_cards(seat, *cards, rules.faces());
-        hands.iter().map(cards).collect()
+        /// The hands of the first deal.
+        fn hands(&mut self) -> &mut Vec<v1::SeatCards> {
+            let deal = self
+                .record
+                .iter_mut()
+                .find_map(|line| match &mut line.line {
+                    Some(Line::Event(v1::GameEvent {
+                        kind: Some(Kind::ShiftStarted(start)),
+                        ..
+                    })) => Some(&mut start.hands),
+                    _ => None,
+                });
+            deal.expect("a deal")
+        }
     }
 
     fn committed() -> Game {
-        let entropy: Vec<Vec<u8>> = vec![vec![1; 32], vec![], vec![3], vec![4; 7]];
-        let plan = SeedPlan::Committed {
-            server_seed: [7; 32],
-            nonce: [8; 32],
+        let record = lines("committed.jsonl");
+        let Some(Line::Header(header)) = &record[0].line else {
+            panic!("a record begins with its header");
         };
-        let seed = plan.game_seed(&entropy);
+        let commitment = header.seed_commitment.clone();
+        let entropy = record.iter().find_map(|line| match &line.line {
+            Some(Line::Event(v1::GameEvent {
+                kind: Some(Kind::GameEnded(end)),
+                ..
+            })) => end.reveal.as_ref().map(|reveal| &reveal.seat_entropy),
+            _ => None,
+        });
         let outcome = |(seat, entropy): (u32, &Vec<u8>)| Outcome {
             room_id: String::new(),
             game_id: String::new(),
@@ -183,98 +138,52 @@ mod tests {
             entropy: entropy.clone(),
             answers: 0,
         };
+        let outcomes = (0..).zip(entropy.expect("a reveal")).map(outcome).collect();
         Game {
-            commitment: plan.commitment(&ID).expect("a commitment").to_vec(),
+            commitment,
             asked: None,
-            outcomes: (0..).zip(&entropy).map(outcome).collect(),
-            reveal: v1::SeedReveal {
-                server_seed: vec![7; 32],
-                nonce: vec![8; 32],
-                seat_entropy: entropy,
-                game_seed: seed.0.to_vec(),
-            },
-            hands: dealt(seed),
+            outcomes,
+            record,
         }
     }
 
     fn fixed() -> Game {
         Game {
+            record: lines("fixed.jsonl"),
             commitment: Vec::new(),
-            asked: Some([9; 32]),
-            reveal: v1::SeedReveal {
-                game_seed: vec![9; 32],
-                ..v1::SeedReveal::default()
-            },
-            hands: dealt(Seed([9; 32])),
+            asked: Some([7; 32]),
             ..committed()
         }
     }
 
-    fn checked(game: &Game) -> Result<Checked, Unproven> {
-        let rules = RuleSetSpec::default().validate().expect("the standard");
-        let event = |kind| {
-            Line::Event(v1::GameEvent {
-                kind: Some(kind),
-                ..v1::GameEvent::default()
-            })
-        };
-        let record = [
-            Line::Header(Box::new(v1::RecordHeader {
-                game_id: hex::encode(ID),
-                rules: Some(rules_to_proto(&rules)),
-                ..v1::RecordHeader::default()
-            })),
-            event(Kind::ShiftStarted(v1::ShiftStarted {
-                shift: 1,
-                hands: game.hands.clone(),
-            })),
-            event(Kind::GameEnded(Box::new(v1::GameEnded {
-                standings: Vec::new(),
-                reveal: Some(game.reveal.clone()),
-            }))),
-        ]
-        .map(|line| v1::RecordLine { line: Some(line) });
-        check(&record, &game.commitment, game.asked, &game.outcomes)
-    }
-
     #[test]
     fn honest_games_are_verified() {
-        for (game, committed) in [(committed(), true), (fixed(), false)] {
-            assert_eq!(
-                checked(&game),
-                Ok(Checked {
-                    deals: 1,
-                    committed
-                })
-            );
+        for (game, deals, committed) in [(committed(), 3, true), (fixed(), 2, false)] {
+            assert_eq!(game.checked(), Ok(Checked { deals, committed }));
         }
     }
 
     #[test]
     fn every_change_is_detected() {
         type Change = fn(&mut Game);
-        let changes: [(&str, Change); 8] = [
-            ("commitment", |game| game.commitment[0] ^= 1),
-            ("server seed", |game| game.reveal.server_seed[0] ^= 1),
-            ("nonce", |game| game.reveal.nonce[31] ^= 1),
-            ("game seed", |game| game.reveal.game_seed[5] ^= 1),
-            ("entropy", |game| game.reveal.seat_entropy[2] = vec![4]),
-            ("long entropy", |game| {
-                game.reveal.seat_entropy[2] = vec![4; 33]
+        let changes: [(&str, Change); 4] = [
+            ("another commitment", |game| game.commitment[0] ^= 1),
+            ("no commitment", |game| {
+                *game = Game {
+                    asked: None,
+                    ..fixed()
+                }
             }),
-            ("entropy reported", |game| game.outcomes[0].entropy[0] ^= 1),
-            ("hands", |game| game.hands.swap(0, 1)),
+            ("entropy", |game| game.outcomes[2].entropy[0] ^= 1),
+            ("hands", |game| game.hands().swap(0, 1)),
         ];
         for (what, change) in changes {
             let mut game = committed();
             change(&mut game);
-            assert!(checked(&game).is_err(), "{what}");
+            assert!(game.checked().is_err(), "{what}");
         }
         let mut other = fixed();
         other.asked = Some([1; 32]);
-        assert!(checked(&other).is_err());
-        let mut hands = fixed();
-        hands.hands.pop();
-        assert!(checked(&hands).is_err());
+        assert!(other.checked().is_err());
     }
 }
