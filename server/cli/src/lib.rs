@@ -6,6 +6,7 @@ mod admin;
 mod agent;
 mod backup;
 pub mod board;
+mod choice;
 mod cluster;
 mod commands;
 mod config;

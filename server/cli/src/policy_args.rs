@@ -4,12 +4,39 @@ use chefshat_client::v1;
 use chefshat_engine::RewardScheme;
 use chefshat_record::convert::reward_scheme_to_proto;
 use clap::builder::PossibleValuesParser;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum as _};
 
+use crate::choice::choice;
 use crate::kind::KindArg;
 
 /// Names of the reward schemes, in the order of their numbers in the protocol, from 1.
 const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
+
+const DURABILITIES: [(&str, v1::Durability, &str); 2] = [
+    (
+        "durable",
+        v1::Durability::Durable,
+        "The game survives the death of the server and resumes",
+    ),
+    (
+        "ephemeral",
+        v1::Durability::Ephemeral,
+        "The game is lost with the server. Faster; its record is stored when it ends",
+    ),
+];
+const VISIBILITIES: [(&str, v1::Visibility, &str); 3] = [
+    ("public", v1::Visibility::Public, "Everybody"),
+    (
+        "unlisted",
+        v1::Visibility::Unlisted,
+        "It is in no list, but anyone who knows its id sees it",
+    ),
+    (
+        "private",
+        v1::Visibility::Private,
+        "Only those who have a ticket or the owner token",
+    ),
+];
 
 /// Times and limits of a room.
 #[derive(Debug, Clone, Default, Args)]
@@ -51,21 +78,11 @@ pub(super) struct PolicyArgs {
     #[arg(long, value_name = "N")]
     spectator_delay: Option<u32>,
     /// What the game survives. Default: durable.
-    #[arg(long)]
-    durability: Option<DurabilityArg>,
+    #[arg(long, value_parser = choice(&DURABILITIES))]
+    durability: Option<v1::Durability>,
     /// Who sees it, with the records of its games. Default: public.
-    #[arg(long, value_name = "WHO")]
-    visibility: Option<VisibilityArg>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum VisibilityArg {
-    /// Everybody.
-    Public,
-    /// It is in no list, but anyone who knows its id sees it.
-    Unlisted,
-    /// Only those who have a ticket or the owner token.
-    Private,
+    #[arg(long, value_name = "WHO", value_parser = choice(&VISIBILITIES))]
+    visibility: Option<v1::Visibility>,
 }
 
 /// What a line about something that is not public ends with.
@@ -75,14 +92,6 @@ pub(super) fn visibility_mark(visibility: v1::Visibility) -> &'static str {
         v1::Visibility::Unlisted => "  (unlisted)",
         v1::Visibility::Private => "  (private)",
     }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DurabilityArg {
-    /// The game survives the death of the server and resumes.
-    Durable,
-    /// The game is lost with the server. Faster; its record is stored when it ends.
-    Ephemeral,
 }
 
 impl PolicyArgs {
@@ -98,20 +107,9 @@ impl PolicyArgs {
             pace_ms: self.pace_ms,
             reward_scheme: reward_scheme_to_proto(scheme).into(),
             spectator_delay_decisions: self.spectator_delay,
-            durability: match self.durability {
-                None => v1::Durability::Unspecified,
-                Some(DurabilityArg::Durable) => v1::Durability::Durable,
-                Some(DurabilityArg::Ephemeral) => v1::Durability::Ephemeral,
-            }
-            .into(),
+            durability: self.durability.unwrap_or_default().into(),
             clocks: self.clocks.clone(),
-            visibility: match self.visibility {
-                None => v1::Visibility::Unspecified,
-                Some(VisibilityArg::Public) => v1::Visibility::Public,
-                Some(VisibilityArg::Unlisted) => v1::Visibility::Unlisted,
-                Some(VisibilityArg::Private) => v1::Visibility::Private,
-            }
-            .into(),
+            visibility: self.visibility.unwrap_or_default().into(),
             ..v1::RoomPolicy::default()
         }
     }

@@ -4,10 +4,11 @@
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_proto::v1;
 use chefshat_record::convert::rules_from_proto;
+use clap::Args;
 use clap::builder::PossibleValuesParser;
-use clap::{Args, ValueEnum};
 
 use super::CommandError;
+use super::choice::choice;
 
 /// A rule set on the command line.
 #[derive(Debug, Clone, Default, Args)]
@@ -37,26 +38,26 @@ pub struct RulesArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     points: Vec<u32>,
     /// Whether cards are exchanged from the second Shift on.
-    #[arg(long, value_name = "ON|OFF")]
-    exchange: Option<Switch>,
+    #[arg(long, value_name = "ON|OFF", value_parser = choice(&ON_OFF))]
+    exchange: Option<bool>,
     /// Same as --exchange off.
     #[arg(long, conflicts_with = "exchange")]
     no_exchange: bool,
     /// Whether special actions are offered from the second Shift on.
-    #[arg(long, value_name = "ON|OFF")]
-    special_actions: Option<Switch>,
+    #[arg(long, value_name = "ON|OFF", value_parser = choice(&ON_OFF))]
+    special_actions: Option<bool>,
     /// Same as --special-actions off.
     #[arg(long, conflicts_with = "special_actions")]
     no_special_actions: bool,
     /// Which seat opens a Shift.
-    #[arg(long)]
-    opening: Option<OpeningFlag>,
+    #[arg(long, value_parser = choice(&OPENINGS))]
+    opening: Option<v1::Opening>,
     /// Whether the seat that opens a Shift may pass on that turn.
-    #[arg(long)]
-    opening_pass: Option<OpeningPass>,
+    #[arg(long, value_parser = choice(&[("forbidden", false, ""), ("allowed", true, "")]))]
+    opening_pass: Option<bool>,
     /// How long a pass binds.
-    #[arg(long)]
-    pass_scope: Option<PassScopeFlag>,
+    #[arg(long, value_parser = choice(&PASS_SCOPES))]
+    pass_scope: Option<v1::PassScope>,
     /// Consecutive pizzas without a play after which the leader has to play.
     #[arg(long, value_name = "PIZZAS")]
     max_idle_pizzas: Option<u32>,
@@ -65,34 +66,23 @@ pub struct RulesArgs {
     max_turns: Option<u32>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Switch {
-    On,
-    Off,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum OpeningFlag {
-    /// The holder of the Golden card, which must be played.
-    Golden,
-    /// The first seat from a random one that holds the highest face, which must be played.
-    AnyTopFace,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum OpeningPass {
-    Forbidden,
-    Allowed,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PassScopeFlag {
-    /// Until the next pizza.
-    Pizza,
-    /// For that turn only.
-    Turn,
-}
+const ON_OFF: [(&str, bool, &str); 2] = [("on", true, ""), ("off", false, "")];
+const OPENINGS: [(&str, v1::Opening, &str); 2] = [
+    (
+        "golden",
+        v1::Opening::Golden,
+        "The holder of the Golden card, which must be played",
+    ),
+    (
+        "any_top_face",
+        v1::Opening::AnyTopFace,
+        "The first seat from a random one that holds the highest face, which must be played",
+    ),
+];
+const PASS_SCOPES: [(&str, v1::PassScope, &str); 2] = [
+    ("pizza", v1::PassScope::Pizza, "Until the next pizza"),
+    ("turn", v1::PassScope::Turn, "For that turn only"),
+];
 
 impl RulesArgs {
     /// Whether no flag changes the default.
@@ -107,7 +97,6 @@ impl RulesArgs {
     /// The rule set for the server; fields that are not given are left to the preset.
     pub fn message(&self) -> v1::RuleSet {
         use v1::rule_set::Stop;
-        let on = |switch: Switch| switch == Switch::On;
         v1::RuleSet {
             preset: self.preset.clone(),
             players: self.players,
@@ -116,22 +105,11 @@ impl RulesArgs {
             stop: (self.target_points.map(Stop::TargetPoints))
                 .or(self.target_shifts.map(Stop::TargetShifts)),
             points: self.points.clone(),
-            exchange: (self.exchange.map(on)).or(self.no_exchange.then_some(false)),
-            special_actions: (self.special_actions.map(on))
-                .or(self.no_special_actions.then_some(false)),
-            opening: match self.opening {
-                None => v1::Opening::Unspecified,
-                Some(OpeningFlag::Golden) => v1::Opening::Golden,
-                Some(OpeningFlag::AnyTopFace) => v1::Opening::AnyTopFace,
-            }
-            .into(),
-            opening_pass: self.opening_pass.map(|pass| pass == OpeningPass::Allowed),
-            pass_scope: match self.pass_scope {
-                None => v1::PassScope::Unspecified,
-                Some(PassScopeFlag::Pizza) => v1::PassScope::Pizza,
-                Some(PassScopeFlag::Turn) => v1::PassScope::Turn,
-            }
-            .into(),
+            exchange: self.exchange.or(self.no_exchange.then_some(false)),
+            special_actions: (self.special_actions).or(self.no_special_actions.then_some(false)),
+            opening: self.opening.unwrap_or_default().into(),
+            opening_pass: self.opening_pass,
+            pass_scope: self.pass_scope.unwrap_or_default().into(),
             max_idle_pizzas: self.max_idle_pizzas,
             max_turns: self.max_turns,
         }

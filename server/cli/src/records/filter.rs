@@ -1,8 +1,9 @@
 //! Flags that filter records.
 
 use chefshat_client::v1;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use crate::choice::choice;
 use crate::kind::{KindArg, kind_filter};
 
 /// Filter of records; all given conditions must hold.
@@ -10,8 +11,8 @@ use crate::kind::{KindArg, kind_filter};
 #[command(next_help_heading = "Which")]
 pub(super) struct FilterArgs {
     /// Games with this end.
-    #[arg(long)]
-    state: Option<EndArg>,
+    #[arg(long, value_parser = choice(&ENDS))]
+    state: Option<v1::RoomState>,
     /// Games with a participant of this name or a built-in agent of this kind.
     #[arg(
         long,
@@ -32,8 +33,8 @@ pub(super) struct FilterArgs {
     )]
     room_name: String,
     /// Games with this origin.
-    #[arg(long)]
-    origin: Option<OriginArg>,
+    #[arg(long, value_parser = choice(&ORIGINS))]
+    origin: Option<v1::GameOrigin>,
     /// Games whose room was created at or after this time, in milliseconds since the Unix epoch.
     #[arg(
         long,
@@ -55,53 +56,43 @@ pub(super) struct FilterArgs {
     hosted_here: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum EndArg {
-    /// The game has a result.
-    Finished,
-    /// The game was aborted.
-    Aborted,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OriginArg {
-    /// Dealt from a seed the server committed to.
-    Dealt,
-    /// Dealt from a seed fixed by the room's creator.
-    FixedSeed,
-    /// Started with given hands.
-    Scripted,
-    /// Branched from another record.
-    Branched,
-    /// Played with real cards elsewhere and imported.
-    Imported,
-    /// Played with real cards in a physical room.
-    Physical,
-}
+const ENDS: [(&str, v1::RoomState, &str); 2] = [
+    ("finished", v1::RoomState::Finished, "The game has a result"),
+    ("aborted", v1::RoomState::Aborted, "The game was aborted"),
+];
+const ORIGINS: [(&str, v1::GameOrigin, &str); 6] = {
+    use v1::GameOrigin::{Branched, Dealt, FixedSeed, Imported, Physical, Scripted};
+    [
+        ("dealt", Dealt, "Dealt from a seed the server committed to"),
+        (
+            "fixed-seed",
+            FixedSeed,
+            "Dealt from a seed fixed by the room's creator",
+        ),
+        ("scripted", Scripted, "Started with given hands"),
+        ("branched", Branched, "Branched from another record"),
+        (
+            "imported",
+            Imported,
+            "Played with real cards elsewhere and imported",
+        ),
+        (
+            "physical",
+            Physical,
+            "Played with real cards in a physical room",
+        ),
+    ]
+};
 
 impl FilterArgs {
     /// The filter for the server.
     pub(super) fn message(&self) -> v1::RecordFilter {
-        let state = match self.state {
-            None => v1::RoomState::Unspecified,
-            Some(EndArg::Finished) => v1::RoomState::Finished,
-            Some(EndArg::Aborted) => v1::RoomState::Aborted,
-        };
-        let origin = match self.origin {
-            None => v1::GameOrigin::Unspecified,
-            Some(OriginArg::Dealt) => v1::GameOrigin::Dealt,
-            Some(OriginArg::FixedSeed) => v1::GameOrigin::FixedSeed,
-            Some(OriginArg::Scripted) => v1::GameOrigin::Scripted,
-            Some(OriginArg::Branched) => v1::GameOrigin::Branched,
-            Some(OriginArg::Imported) => v1::GameOrigin::Imported,
-            Some(OriginArg::Physical) => v1::GameOrigin::Physical,
-        };
         v1::RecordFilter {
-            state: state.into(),
+            state: self.state.unwrap_or_default().into(),
             participant: self.participant.clone(),
             kind: kind_filter(self.kind).into(),
             room_name: self.room_name.clone(),
-            origin: origin.into(),
+            origin: self.origin.unwrap_or_default().into(),
             created_from_ms: self.created_from_ms,
             created_before_ms: self.created_before_ms,
             hosted_here: self.hosted_here,

@@ -4,11 +4,12 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use chefshat_client::v1;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::super::connect::{SecretArgs, ServerArg};
 use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages, say};
+use crate::choice::choice;
 use crate::kind::kind_name;
 use crate::narration::{abort_reason, clean};
 use crate::numbers::seat_number;
@@ -22,8 +23,8 @@ pub(super) struct List {
     #[command(flatten)]
     secrets: SecretArgs,
     /// Only rooms in this state.
-    #[arg(long)]
-    state: Option<StateArg>,
+    #[arg(long, value_parser = choice(&STATES))]
+    state: Option<v1::RoomState>,
     /// Print each room as a JSON line.
     #[arg(long)]
     json: bool,
@@ -45,27 +46,19 @@ pub(super) struct Show {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum StateArg {
-    Waiting,
-    Playing,
-    Finished,
-    Aborted,
-}
+const STATES: [(&str, v1::RoomState, &str); 4] = [
+    ("waiting", v1::RoomState::Waiting, ""),
+    ("playing", v1::RoomState::Playing, ""),
+    ("finished", v1::RoomState::Finished, ""),
+    ("aborted", v1::RoomState::Aborted, ""),
+];
 
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect_with(&self.secrets).await?;
-        let state = match self.state {
-            None => v1::RoomState::Unspecified,
-            Some(StateArg::Waiting) => v1::RoomState::Waiting,
-            Some(StateArg::Playing) => v1::RoomState::Playing,
-            Some(StateArg::Finished) => v1::RoomState::Finished,
-            Some(StateArg::Aborted) => v1::RoomState::Aborted,
-        };
         let fetch = async |page_token| {
             let request = v1::ListRoomsRequest {
-                state: state.into(),
+                state: self.state.unwrap_or_default().into(),
                 page_size: pages::PAGE,
                 page_token,
             };

@@ -10,7 +10,8 @@ use super::super::connect::{SecretArgs, ServerArg};
 use super::super::numbers::{counted, ordinal};
 use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages, say};
-use super::words::{StateArg, format_name, state};
+use super::words::{STATES, format_name, state};
+use crate::choice::choice;
 use crate::narration::clean;
 
 /// Page size of the list of games.
@@ -25,8 +26,8 @@ pub(super) struct List {
     #[command(flatten)]
     secrets: SecretArgs,
     /// Only tournaments in this state.
-    #[arg(long)]
-    state: Option<StateArg>,
+    #[arg(long, value_parser = choice(&STATES))]
+    state: Option<v1::TournamentState>,
     /// Print each tournament as a JSON line.
     #[arg(long)]
     json: bool,
@@ -58,12 +59,11 @@ pub(super) struct Games {
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect_with(&self.secrets).await?;
-        let state = (self.state).map_or(v1::TournamentState::Unspecified, StateArg::state);
         let fetch = async |page_token| {
             let request = v1::ListTournamentsRequest {
                 page_size: pages::PAGE,
                 page_token,
-                state: state.into(),
+                state: self.state.unwrap_or_default().into(),
             };
             let page = client.list_tournaments(request).await?;
             Ok((page.tournaments, page.next_page_token))

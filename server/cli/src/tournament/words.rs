@@ -50,29 +50,16 @@ impl DealsArg {
     }
 }
 
-/// State of a tournament.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum StateArg {
-    /// Participants may join.
-    Open,
-    /// Games are being played.
-    Playing,
-    /// All games are over.
-    Finished,
-    /// The owner closed it early.
-    Closed,
-}
-
-impl StateArg {
-    pub(super) fn state(self) -> v1::TournamentState {
-        match self {
-            Self::Open => v1::TournamentState::Open,
-            Self::Playing => v1::TournamentState::Playing,
-            Self::Finished => v1::TournamentState::Finished,
-            Self::Closed => v1::TournamentState::Closed,
-        }
-    }
-}
+/// States of tournaments.
+pub(super) const STATES: [(&str, v1::TournamentState, &str); 4] = {
+    use v1::TournamentState::{Closed, Finished, Open, Playing};
+    [
+        ("open", Open, "Participants may join"),
+        ("playing", Playing, "Games are being played"),
+        ("finished", Finished, "All games are over"),
+        ("closed", Closed, "The owner closed it early"),
+    ]
+};
 
 /// Parses a point in time, or a duration from now, to milliseconds since the Unix epoch.
 pub(super) fn time(words: &str) -> Result<u64, String> {
