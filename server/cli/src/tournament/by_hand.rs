@@ -185,8 +185,8 @@ impl Withdraw {
 
 impl Remove {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (id, token) = (&self.owned.tournament_id, self.owned.owner.token()?);
-        let client = self.owned.server.connect().await?.with_secrets([&token])?;
+        let id = &self.owned.tournament_id;
+        let (client, token) = self.owned.client().await?;
         let participant = number_of(&client, id, &self.participant).await?;
         let tournament = client
             .remove_participant(id.as_str(), token, participant)
@@ -197,8 +197,8 @@ impl Remove {
 
 impl Replace {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (id, token) = (&self.owned.tournament_id, self.owned.owner.token()?);
-        let client = self.owned.server.connect().await?.with_secrets([&token])?;
+        let id = &self.owned.tournament_id;
+        let (client, token) = self.owned.client().await?;
         let participant = number_of(&client, id, &self.participant).await?;
         let ticket_file = (self.ticket_file.as_deref())
             .map(|file| SecretFile::new_only(file, "--ticket-file", "a ticket"))
@@ -255,8 +255,8 @@ impl Postpone {
 
 impl CallAgain {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (id, token) = (&self.owned.tournament_id, self.owned.owner.token()?);
-        let client = self.owned.server.connect().await?.with_secrets([&token])?;
+        let id = &self.owned.tournament_id;
+        let (client, token) = self.owned.client().await?;
         let game = client.call_game(id.as_str(), token, self.game).await?;
         report_game("called", self.owned.json, &client, id, &game).await
     }

@@ -19,6 +19,7 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::CommandError;
+use owner::Change;
 
 /// Create, join and follow tournaments, and show their results.
 #[derive(Debug, Args)]
@@ -89,17 +90,17 @@ impl TournamentCommand {
         match self.action {
             TournamentAction::Create(command) => command.run().await,
             TournamentAction::Join(command) => command.run().await,
-            TournamentAction::Start(owned) => owned.start().await,
+            TournamentAction::Start(owned) => owned.change(Change::Start).await,
             TournamentAction::Add(command) => command.run().await,
             TournamentAction::Table(command) => command.run().await,
             TournamentAction::Withdraw(command) => command.run().await,
             TournamentAction::Remove(command) => command.run().await,
             TournamentAction::Replace(command) => command.run().await,
-            TournamentAction::Pause(owned) => owned.pause().await,
-            TournamentAction::Resume(owned) => owned.resume().await,
+            TournamentAction::Pause(owned) => owned.change(Change::Pause).await,
+            TournamentAction::Resume(owned) => owned.change(Change::Resume).await,
             TournamentAction::Postpone(command) => command.run().await,
             TournamentAction::Call(command) => command.run().await,
-            TournamentAction::Close(owned) => owned.close().await,
+            TournamentAction::Close(owned) => owned.change(Change::Close).await,
             TournamentAction::Follow(command) => command.run().await,
             TournamentAction::Results(command) => command.run().await,
             TournamentAction::Simulate(command) => command.run(),

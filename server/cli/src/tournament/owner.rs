@@ -4,7 +4,7 @@
 use std::process::ExitCode;
 
 use crate::kind::KindArg;
-use chefshat_client::v1;
+use chefshat_client::{Client, v1};
 use clap::Args;
 
 use super::super::connect::{OwnerArgs, ServerArg, attendant_link};
@@ -59,10 +59,7 @@ pub(super) struct Table {
 
 impl Add {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (
-            self.owned.owner.token()?,
-            self.owned.server.connect().await?,
-        );
+        let (client, token) = self.owned.client().await?;
         let request = v1::AddTableParticipantRequest {
             tournament_id: self.owned.tournament_id.clone(),
             owner_token: token,
@@ -85,10 +82,7 @@ impl Add {
 
 impl Table {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (
-            self.owned.owner.token()?,
-            self.owned.server.connect().await?,
-        );
+        let (client, token) = self.owned.client().await?;
         let table = client
             .physical_table(self.owned.tournament_id.as_str(), token, self.game)
             .await?;
@@ -109,53 +103,46 @@ impl Table {
     }
 }
 
+/// What the owner does with the whole tournament.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Change {
+    /// Starts it with the participants who have joined.
+    Start,
+    Close,
+    Pause,
+    Resume,
+}
+
 impl Owned {
-    /// Starts the tournament with the participants who have joined.
-    pub(super) async fn start(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owner.token()?, self.server.connect().await?);
-        let tournament = client
-            .start_tournament(self.tournament_id.as_str(), token)
-            .await?;
-        self.print("started", &tournament)
+    /// The server, which is shown the owner token with each call, and that token.
+    pub(super) async fn client(&self) -> Result<(Client, String), CommandError> {
+        let token = self.owner.token()?;
+        let client = self.server.connect().await?.with_secrets([&token])?;
+        Ok((client, token))
     }
 
-    /// Closes the tournament.
-    pub(super) async fn close(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owner.token()?, self.server.connect().await?);
-        let tournament = client
-            .close_tournament(self.tournament_id.as_str(), token)
-            .await?;
-        self.print("closed", &tournament)
-    }
-
-    /// Pauses the tournament.
-    pub(super) async fn pause(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owner.token()?, self.server.connect().await?);
-        let tournament = client
-            .pause_tournament(self.tournament_id.as_str(), token)
-            .await?;
-        self.print("paused", &tournament)
-    }
-
-    /// Resumes the tournament.
-    pub(super) async fn resume(self) -> Result<ExitCode, CommandError> {
-        let (token, client) = (self.owner.token()?, self.server.connect().await?);
-        let tournament = client
-            .resume_tournament(self.tournament_id.as_str(), token)
-            .await?;
-        self.print("resumed", &tournament)
-    }
-
-    fn print(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {
+    /// Changes the tournament.
+    pub(super) async fn change(self, change: Change) -> Result<ExitCode, CommandError> {
+        let (client, token) = self.client().await?;
+        let id = self.tournament_id.as_str();
+        let (event, changed) = match change {
+            Change::Start => ("started", client.start_tournament(id, token).await),
+            Change::Close => ("closed", client.close_tournament(id, token).await),
+            Change::Pause => ("paused", client.pause_tournament(id, token).await),
+            Change::Resume => ("resumed", client.resume_tournament(id, token).await),
+        };
+        let tournament = changed?;
         if self.json {
             say(serde_json::json!({"event": event, "tournament": tournament}))?;
         } else {
-            let id = &tournament.tournament_id;
             let state = match tournament.paused {
                 true => "paused",
                 false => state(tournament.state()),
             };
-            say(format_args!("tournament {id} is {state}"))?;
+            say(format_args!(
+                "tournament {} is {state}",
+                tournament.tournament_id
+            ))?;
         }
         Ok(ExitCode::SUCCESS)
     }
