@@ -180,11 +180,9 @@ impl SettingsFile {
             let is_global = command.get_arguments().any(|other| other.get_id() == id);
             command = match is_global {
                 true => command.mut_arg(id, set),
-                false => ["serve", "config"]
-                    .into_iter()
-                    .fold(command, |command, name| {
-                        command.mut_subcommand(name, |sub| sub.mut_arg(id, set))
-                    }),
+                false => COMMANDS.into_iter().fold(command, |command, name| {
+                    command.mut_subcommand(name, |sub| sub.mut_arg(id, set))
+                }),
             };
         }
         command
@@ -280,21 +278,12 @@ fn reason(error: &clap::Error) -> String {
     }
 }
 
-/// Where a value comes from.
-enum Source {
-    Flag,
-    Environment,
-    File,
-    Default,
-    /// There is no value.
-    Unset,
-}
-
 /// A setting and its effective value.
 struct Effective {
     argument: Arg,
     value: Option<Value>,
-    source: Source,
+    /// Where the value comes from, in a word; "unset" if there is none.
+    source: &'static str,
     /// The flag, variable or file of the source.
     origin: Option<String>,
 }
@@ -310,15 +299,15 @@ impl Effective {
             _ => values.next(),
         };
         let (source, origin) = match matches.value_source(id) {
-            Some(ValueSource::CommandLine) => (Source::Flag, Some(format!("--{}", key(&argument)))),
+            Some(ValueSource::CommandLine) => ("flag", Some(format!("--{}", key(&argument)))),
             Some(ValueSource::EnvVariable) => {
                 let name = argument.get_env().map(|name| name.to_string_lossy());
-                (Source::Environment, name.map(|name| name.into_owned()))
+                ("environment", name.map(|name| name.into_owned()))
             }
             _ => match file.filter(|file| file.sets(&argument)) {
-                Some(file) => (Source::File, Some(file.path.display().to_string())),
-                None if value.is_some() => (Source::Default, None),
-                None => (Source::Unset, None),
+                Some(file) => ("file", Some(file.path.display().to_string())),
+                None if value.is_some() => ("default", None),
+                None => ("unset", None),
             },
         };
         Self {
@@ -345,10 +334,7 @@ fn as_toml(effective: &[Effective]) -> String {
     let mut text = String::new();
     for setting in effective {
         let key = key(&setting.argument);
-        let source = match (&setting.source, &setting.origin) {
-            (_, Some(origin)) => origin.clone(),
-            _ => "default".to_owned(),
-        };
+        let source = setting.origin.as_deref().unwrap_or(setting.source);
         let line = match &setting.value {
             Some(value) => writeln!(text, "{key} = {value}  # {source}"),
             None => writeln!(text, "# {key} is not set"),
@@ -360,17 +346,10 @@ fn as_toml(effective: &[Effective]) -> String {
 
 fn as_json(effective: &[Effective]) -> Value {
     let settings = effective.iter().map(|setting| {
-        let source = match setting.source {
-            Source::Flag => "flag",
-            Source::Environment => "environment",
-            Source::File => "file",
-            Source::Default => "default",
-            Source::Unset => "unset",
-        };
         json!({
             "name": key(&setting.argument),
             "value": setting.value,
-            "source": source,
+            "source": setting.source,
             "origin": setting.origin,
         })
     });
