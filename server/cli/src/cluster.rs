@@ -77,6 +77,9 @@ struct Drain {
     node: String,
     #[command(flatten)]
     database: DatabaseArg,
+    /// Print the node as a JSON line.
+    #[arg(long)]
+    json: bool,
 }
 
 impl ClusterCommand {
@@ -227,6 +230,9 @@ impl Drain {
         };
         if !store.request_drain(node.id).await? {
             return Err(format!("node {} has just left", node.id.0).into());
+        }
+        if self.json {
+            return say(json!({ "event": "draining", "node": as_json(node) }));
         }
         say(format_args!(
             "node {} ({}) hands over {}, {} and {}, then stops",

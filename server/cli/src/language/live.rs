@@ -166,13 +166,11 @@ impl Live {
 
     fn put(&mut self, play: &v1::Play) {
         let faces = self.view.faces();
-        let face = std::iter::repeat_n(play.face, usize::try_from(play.quantity).unwrap_or(0));
-        let jokers = std::iter::repeat_n(faces + 1, usize::try_from(play.jokers).unwrap_or(0));
-        let cards: Vec<u32> = face.chain(jokers).collect();
         if self.played.counts.is_empty() {
             self.played = Hand::of(usize::try_from(faces).unwrap_or(0), &[], false);
         }
-        self.played.put(&cards);
+        self.played.add(play.face, play.quantity);
+        self.played.add(faces + 1, play.jokers);
     }
 
     /// Whether an event shows that the open decision was taken without the participant, by a timeout

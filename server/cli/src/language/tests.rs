@@ -103,6 +103,23 @@ fn what_happened_begins_after_the_event_that_was_asked_for() {
 }
 
 #[test]
+fn a_play_of_more_cards_than_any_deck_takes_no_memory() {
+    let mut live = Live::new(GameView::default(), Some(0));
+    let play = Kind::Play(v1::Play {
+        face: 3,
+        quantity: u32::MAX,
+        jokers: u32::MAX,
+        ..v1::Play::default()
+    });
+    let events = vec![v1::GameEvent {
+        kind: Some(play),
+        ..v1::GameEvent::default()
+    }];
+    live.take(Update::Events(v1::EventBatch { events }), 0);
+    assert_eq!(live.played.counts[2], u8::MAX);
+}
+
+#[test]
 fn after_a_pause_a_decision_has_its_full_time_again() {
     let mut live = Live::new(GameView::default(), Some(0));
     let request = v1::DecisionRequest {

@@ -38,7 +38,11 @@ impl Chain {
         let seats = view.seats.len().max(1);
         let longest = view.seats.iter().map(|seat| columns(&seat.name)).max();
         Self {
-            side: longest.unwrap_or(0).min(SIDE / seats - 2).max(4) + 2,
+            side: longest
+                .unwrap_or(0)
+                .min((SIDE / seats).saturating_sub(2))
+                .max(4)
+                + 2,
             ..Self::default()
         }
     }

@@ -36,9 +36,15 @@ impl Hand {
     /// Adds cards, by their faces.
     pub fn put(&mut self, cards: &[u32]) {
         for card in cards {
-            if let Some(count) = self.slot(*card) {
-                *count = count.saturating_add(1);
-            }
+            self.add(*card, 1);
+        }
+    }
+
+    /// Adds cards of a face.
+    pub fn add(&mut self, face: u32, quantity: u32) {
+        let quantity = u8::try_from(quantity).unwrap_or(u8::MAX);
+        if let Some(count) = self.slot(face) {
+            *count = count.saturating_add(quantity);
         }
     }
 

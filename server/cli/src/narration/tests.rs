@@ -357,6 +357,20 @@ fn names_are_safe_and_unique() {
 }
 
 #[test]
+fn a_table_with_more_seats_than_any_game_has_a_line() {
+    let names = ["Ada"; 100];
+    let most = u32::MAX;
+    let table = [
+        game_started(&standard(), &names),
+        shift_started(most),
+        play(99, (most, most, most), most),
+        done(most, Some(most), most),
+    ];
+    let text = text_of(&mut Narrator::default(), table);
+    assert!(text.contains("Ada#100 4294967295×4294967295"), "{text}");
+}
+
+#[test]
 fn a_correction_at_a_physical_table_takes_back_what_is_void() {
     use v1::DecisionSource::Table;
     let mut narrator = Narrator::of_room(&v1::Room {

@@ -298,7 +298,7 @@ impl Views {
 
     /// The next view of a later step.
     async fn after(&mut self, step: u32) -> Result<v1::StudyView, Status> {
-        self.next(step + 1).await
+        self.next(step.saturating_add(1)).await
     }
 
     /// The next view that is not of an earlier step.

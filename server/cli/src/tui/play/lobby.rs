@@ -283,7 +283,7 @@ impl Lobby {
         if report.games.iter().any(|game| sits(game, self.me)) {
             format!(
                 "Your part of round {round} is over; round {} is drawn when the others have finished.",
-                round + 1
+                round.saturating_add(1)
             )
         } else {
             format!("You have a bye in round {round} of {rounds}.")
