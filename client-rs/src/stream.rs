@@ -127,8 +127,32 @@ impl<T: Send + 'static> Reconnecting<T> {
         }
     }
 
+    /// The next state of something whose server ends no stream. `state`: that of a message; `None` is a
+    /// heartbeat. Cancel safe, as [`next`](Self::next).
+    pub(crate) async fn next_state<F, S>(
+        &mut self,
+        mut open: impl FnMut() -> F,
+        state: impl Fn(T) -> Option<S>,
+    ) -> Result<S, Error>
+    where
+        F: Future<Output = Result<Response<Streaming<T>>, Status>> + Send + 'static,
+    {
+        loop {
+            match self.next(&mut open).await {
+                Ok(Some(message)) => {
+                    if let Some(state) = state(message) {
+                        self.received_state();
+                        return Ok(state);
+                    }
+                }
+                Ok(None) => self.ended().or_again()?,
+                Err(broken) => broken.or_again()?,
+            }
+        }
+    }
+
     /// Ends the outage if this is not the first state of the stream: each stream begins with one.
-    pub(crate) fn received_state(&mut self) {
+    fn received_state(&mut self) {
         if let State::Open { has_state, .. } = &mut self.state
             && std::mem::replace(has_state, true)
         {

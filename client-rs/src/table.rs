@@ -8,7 +8,7 @@ use crate::client::Client;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
 use crate::repeat::repeated;
-use crate::stream::{Broken, Reconnecting};
+use crate::stream::Reconnecting;
 use crate::v1::{self, table_service_client::TableServiceClient};
 
 impl Client {
@@ -56,8 +56,7 @@ impl Client {
             report: Some(report),
         };
         let service = service(self);
-        repeated(|| async { service.clone().report(request.clone()).await })
-        .await
+        repeated(|| async { service.clone().report(request.clone()).await }).await
     }
 
     /// Follows the state of a physical table. Connects when the first state is requested.
@@ -95,20 +94,20 @@ impl TableFollower {
     /// The server's refusal (`TICKET_UNKNOWN`, `TOO_MANY_SPECTATORS`), or the last failure if the
     /// connection cannot be restored in time. After an error there are no more states.
     pub async fn next(&mut self) -> Result<Option<v1::TableState>, Error> {
-        while !self.over {
-            match self.receive().await {
-                // A response without a state is a heartbeat.
-                Ok(response) => {
-                    if let Some(state) = response.state {
-                        self.stream.received_state();
-                        self.over = state.stage() == v1::TableStage::Over;
-                        return Ok(Some(state));
-                    }
-                }
-                Err(broken) => broken.or_again().inspect_err(|_| self.over = true)?,
-            }
+        if self.over {
+            return Ok(None);
         }
-        Ok(None)
+        let watch = || {
+            let (mut service, table_ticket) = (self.service.clone(), self.table_ticket.clone());
+            let request = v1::TableServiceWatchRequest { table_ticket };
+            async move { service.watch(request).await }
+        };
+        let state = self
+            .stream
+            .next_state(watch, |response| response.state)
+            .await;
+        self.over = (state.as_ref()).map_or(true, |it| it.stage() == v1::TableStage::Over);
+        state.map(Some)
     }
 
     /// Converts the follower to a [`Stream`].
@@ -117,15 +116,6 @@ impl TableFollower {
             let state = follower.next().await?;
             Ok(state.map(|state| (state, follower)))
         })
-    }
-
-    async fn receive(&mut self) -> Result<v1::TableServiceWatchResponse, Broken> {
-        let response = self.stream.next(|| {
-            let (mut service, table_ticket) = (self.service.clone(), self.table_ticket.clone());
-            let request = v1::TableServiceWatchRequest { table_ticket };
-            async move { service.watch(request).await }
-        });
-        response.await?.ok_or_else(|| self.stream.ended())
     }
 }
 

@@ -10,7 +10,7 @@ use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::{Error, PlayError};
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
-use crate::stream::{Broken, Reconnecting};
+use crate::stream::Reconnecting;
 use crate::v1::tournament_service_client::TournamentServiceClient;
 use crate::{Agent, Client, Outcome, PlayOptions, run, v1};
 
@@ -31,8 +31,7 @@ impl Client {
             ..Default::default()
         };
         identify(&mut request.request_id);
-        repeated(|| async { service(self).create_tournament(request.clone()).await })
-        .await
+        repeated(|| async { service(self).create_tournament(request.clone()).await }).await
     }
 
     /// The public view of a tournament.
@@ -59,8 +58,7 @@ impl Client {
         &self,
         request: v1::ListTournamentsRequest,
     ) -> Result<v1::ListTournamentsResponse, Error> {
-        repeated(|| async { service(self).list_tournaments(request.clone()).await })
-        .await
+        repeated(|| async { service(self).list_tournaments(request.clone()).await }).await
     }
 
     /// Joins a tournament, which the join code identifies. The response has the ticket for
@@ -76,8 +74,7 @@ impl Client {
         mut request: v1::JoinTournamentRequest,
     ) -> Result<v1::JoinTournamentResponse, Error> {
         identify(&mut request.request_id);
-        repeated(|| async { service(self).join_tournament(request.clone()).await })
-        .await
+        repeated(|| async { service(self).join_tournament(request.clone()).await }).await
     }
 
     /// Adds a participant who plays at a physical table with real cards, and for whom nobody
@@ -92,8 +89,7 @@ impl Client {
         mut request: v1::AddTableParticipantRequest,
     ) -> Result<v1::AddTableParticipantResponse, Error> {
         identify(&mut request.request_id);
-        repeated(|| async { service(self).add_table_participant(request.clone()).await })
-        .await
+        repeated(|| async { service(self).add_table_participant(request.clone()).await }).await
     }
 
     /// The secrets of the physical table at which a game is being played.
@@ -112,8 +108,7 @@ impl Client {
             owner_token: owner_token.into(),
             game,
         };
-        repeated(|| async { service(self).get_physical_table(request.clone()).await })
-        .await
+        repeated(|| async { service(self).get_physical_table(request.clone()).await }).await
     }
 
     /// Starts a tournament.
@@ -161,8 +156,7 @@ impl Client {
         let request = v1::GetTournamentResultsRequest {
             tournament_id: tournament_id.into(),
         };
-        repeated(|| async { service(self).get_tournament_results(request.clone()).await })
-        .await
+        repeated(|| async { service(self).get_tournament_results(request.clone()).await }).await
     }
 
     /// A page of a tournament's games, in order.
@@ -173,8 +167,7 @@ impl Client {
         &self,
         request: v1::ListTournamentGamesRequest,
     ) -> Result<v1::ListTournamentGamesResponse, Error> {
-        repeated(|| async { service(self).list_tournament_games(request.clone()).await })
-        .await
+        repeated(|| async { service(self).list_tournament_games(request.clone()).await }).await
     }
 
     /// The ratings of everybody who has played rated games on the server, best first.
@@ -185,8 +178,7 @@ impl Client {
         &self,
         request: v1::GetLeaderboardRequest,
     ) -> Result<v1::GetLeaderboardResponse, Error> {
-        repeated(|| async { service(self).get_leaderboard(request).await })
-        .await
+        repeated(|| async { service(self).get_leaderboard(request).await }).await
     }
 
     /// Follows a tournament. Connects when the first report is requested.
@@ -278,20 +270,20 @@ impl TournamentFollower {
     /// The server's refusal (`TOURNAMENT_UNKNOWN`, `TOO_MANY_FOLLOWERS`), or the last failure if
     /// the connection cannot be restored in time. After an error there are no more reports.
     pub async fn next(&mut self) -> Result<Option<v1::FollowTournamentResponse>, Error> {
-        while !self.over {
-            match self.receive().await {
-                // A report without a tournament is a heartbeat.
-                Ok(report) => {
-                    if let Some(tournament) = &report.tournament {
-                        self.stream.received_state();
-                        self.over = is_over(tournament);
-                        return Ok(Some(report));
-                    }
-                }
-                Err(broken) => broken.or_again().inspect_err(|_| self.over = true)?,
-            }
+        if self.over {
+            return Ok(None);
         }
-        Ok(None)
+        let follow = || {
+            let (mut service, tournament_id) = (self.service.clone(), self.tournament_id.clone());
+            let request = v1::FollowTournamentRequest { tournament_id };
+            async move { service.follow_tournament(request).await }
+        };
+        let state =
+            |report: v1::FollowTournamentResponse| report.tournament.is_some().then_some(report);
+        let report = self.stream.next_state(follow, state).await;
+        let tournament = report.as_ref().map(|report| report.tournament.as_ref());
+        self.over = tournament.map_or(true, |it| it.is_some_and(is_over));
+        report.map(Some)
     }
 
     /// Converts the follower to a [`Stream`].
@@ -302,15 +294,6 @@ impl TournamentFollower {
             let report = follower.next().await?;
             Ok(report.map(|report| (report, follower)))
         })
-    }
-
-    async fn receive(&mut self) -> Result<v1::FollowTournamentResponse, Broken> {
-        let report = self.stream.next(|| {
-            let (mut service, tournament_id) = (self.service.clone(), self.tournament_id.clone());
-            let request = v1::FollowTournamentRequest { tournament_id };
-            async move { service.follow_tournament(request).await }
-        });
-        report.await?.ok_or_else(|| self.stream.ended())
     }
 }
 
