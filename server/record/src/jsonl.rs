@@ -7,7 +7,10 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
-use chefshat_proto::v1::{RecordLine, record_line::Line};
+use chefshat_engine::MAX_SEATS;
+use chefshat_engine::limits::MAX_ANNOTATION_BYTES_PER_GAME;
+use chefshat_proto::v1::{RecordLine, game_event::Kind, record_line::Line};
+use prost::Message;
 
 use crate::atomic_file::{AtomicFile, WriteError};
 use crate::private;
@@ -25,6 +28,9 @@ pub const MAX_LINES: usize = 2_100_000;
 /// The largest record, bytes. A thousand Shifts take about 25 MB; the most events a server allows
 /// also stay below it.
 pub const MAX_RECORD_BYTES: u64 = 512 * 1024 * 1024;
+
+/// The most annotations of a record, bytes of their messages: each seat has its share.
+pub const MAX_ANNOTATION_BYTES_PER_RECORD: usize = MAX_SEATS * MAX_ANNOTATION_BYTES_PER_GAME;
 
 /// A failure to write or read a record.
 #[derive(Debug, thiserror::Error)]
@@ -84,6 +90,14 @@ pub enum LineProblem {
     /// The file contains a second header.
     #[error("is a second header: a file holds one record")]
     SecondHeader,
+    /// The line starts the game again.
+    #[error("starts the game a second time: a file holds one record")]
+    SecondStart,
+    /// The annotations of all lines so far exceed [`MAX_ANNOTATION_BYTES_PER_RECORD`].
+    #[error(
+        "is one too many with annotations: a record has at most {MAX_ANNOTATION_BYTES_PER_RECORD} bytes of them"
+    )]
+    Annotations,
     /// The line is not JSON.
     #[error("is not JSON: {0}")]
     NotJson(String),
@@ -315,6 +329,7 @@ fn read_lines(
     let Record { lines, text } = record;
     let most_of_line = u64::try_from(MAX_LINE_BYTES).expect("a fraction of a mebibyte") + 1;
     let (mut bytes, mut all_bytes) = (Vec::new(), 0u64);
+    let mut bounds = Bounds::default();
     loop {
         bytes.clear();
         let read = (&mut file)
@@ -339,7 +354,7 @@ fn read_lines(
             // A truncated file has no final line feed.
             _ => LineProblem::CutOff,
         })?;
-        check(&line, lines.is_empty())?;
+        bounds.check(&line, lines.is_empty())?;
         *text = text.and_read(&line, bytes.strip_suffix(b"\n").unwrap_or(&bytes));
         lines.push(line);
     }
@@ -349,16 +364,36 @@ fn read_lines(
     Ok(())
 }
 
-/// Checks the bounds that keep a small file from becoming large in memory; the replay checks the
-/// rest.
-fn check(line: &RecordLine, is_first: bool) -> Result<(), LineProblem> {
-    let line = line.line.as_ref().ok_or(LineProblem::Nothing)?;
-    if !is_first && matches!(line, Line::Header(_)) {
-        return Err(LineProblem::SecondHeader);
-    }
-    match excess(line) {
-        Some(Excess { field, most }) => Err(LineProblem::LongList { field, most }),
-        None => Ok(()),
+/// The bounds that keep a small file from becoming large in memory; the replay checks the rest.
+#[derive(Default)]
+struct Bounds {
+    has_started: bool,
+    annotation_bytes: usize,
+}
+
+impl Bounds {
+    fn check(&mut self, line: &RecordLine, is_first: bool) -> Result<(), LineProblem> {
+        let line = line.line.as_ref().ok_or(LineProblem::Nothing)?;
+        match line {
+            Line::Header(_) if !is_first => return Err(LineProblem::SecondHeader),
+            Line::Event(event) if matches!(event.kind, Some(Kind::GameStarted(_))) => {
+                if std::mem::replace(&mut self.has_started, true) {
+                    return Err(LineProblem::SecondStart);
+                }
+            }
+            Line::Decision(decision) => {
+                let annotations = decision.annotations.as_ref();
+                self.annotation_bytes += annotations.map_or(0, Message::encoded_len);
+                if self.annotation_bytes > MAX_ANNOTATION_BYTES_PER_RECORD {
+                    return Err(LineProblem::Annotations);
+                }
+            }
+            _ => {}
+        }
+        match excess(line) {
+            Some(Excess { field, most }) => Err(LineProblem::LongList { field, most }),
+            None => Ok(()),
+        }
     }
 }
 
@@ -414,6 +449,22 @@ mod tests {
         assert!(matches!(
             read("{}\n", MAX_LINES),
             (0, Err(Stopped::Line(LineProblem::Nothing)))
+        ));
+        // Six seats of a start take a kilobyte.
+        let start = "{\"event\":{\"gameStarted\":{\"seats\":[{},{},{},{},{},{}]}}}\n";
+        assert!(matches!(
+            read(&start.repeat(2), MAX_LINES),
+            (1, Err(Stopped::Line(LineProblem::SecondStart)))
+        ));
+        // So does an entry of a few bytes.
+        let keys: Vec<String> = (0..500).map(|key| format!("\"{key:03}\":\"\"")).collect();
+        let annotations = format!("{{\"extra\":{{{}}}}}", keys.join(","));
+        let decision = format!("{{\"decision\":{{\"annotations\":{annotations}}}}}\n");
+        let (lines, too_many) = read(&decision.repeat(1_000), MAX_LINES);
+        assert!((300..500).contains(&lines), "{lines}");
+        assert!(matches!(
+            too_many,
+            Err(Stopped::Line(LineProblem::Annotations))
         ));
         let text = "{\"event\":{}}\n".repeat(3);
         assert!(matches!(read(&text, 3), (3, Ok(()))));

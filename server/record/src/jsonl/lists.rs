@@ -9,6 +9,8 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 const MAX_CARDS: usize = MAX_FACES as usize * (MAX_FACES as usize + 1) / 2 + MAX_JOKERS as usize;
 /// The most scores or keys of annotations; a server accepts no more.
 const MAX_ANNOTATIONS: usize = 1_024;
+/// The most clocks of a policy, one of each kind of participant.
+const MAX_CLOCKS: usize = 4;
 /// The most parts a branched game may have taken over, one per branch before it.
 const MAX_TAKEN_OVER: usize = 2_048;
 
@@ -46,6 +48,7 @@ fn of_header(header: &v1::RecordHeader) -> Option<Excess> {
         ("takenOver", taken_over, MAX_TAKEN_OVER),
     ])
     .or_else(|| of_rules(header.rules.as_ref()))
+    .or_else(|| of_policy(header.policy.as_ref()))
     .or_else(|| {
         let script = script?;
         first([
@@ -74,7 +77,8 @@ fn of_decision(decision: &v1::DecisionRecord) -> Option<Excess> {
 fn of_event(kind: &Kind) -> Option<Excess> {
     match kind {
         Kind::GameStarted(started) => first([("seats", started.seats.len(), MAX_SEATS)])
-            .or_else(|| of_rules(started.rules.as_ref())),
+            .or_else(|| of_rules(started.rules.as_ref()))
+            .or_else(|| of_policy(started.policy.as_ref())),
         Kind::ShiftStarted(started) => of_hands(&started.hands),
         Kind::RolesAssigned(assigned) => first([("roles", assigned.roles.len(), MAX_SEATS)]),
         Kind::CardsExchanged(exchanged) => first([("cards", exchanged.cards.len(), MAX_CARDS)]),
@@ -108,6 +112,10 @@ fn of_event(kind: &Kind) -> Option<Excess> {
 
 fn of_rules(rules: Option<&v1::RuleSet>) -> Option<Excess> {
     first([("points", rules?.points.len(), MAX_SEATS)])
+}
+
+fn of_policy(policy: Option<&v1::RoomPolicy>) -> Option<Excess> {
+    first([("clocks", policy?.clocks.len(), MAX_CLOCKS)])
 }
 
 fn of_hands(hands: &[v1::SeatCards]) -> Option<Excess> {

@@ -103,6 +103,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("game id", Set(1, "/header/gameId", json!("22B73F3BBA773C1120E1858DE68CD801")), 1, "32 hexadecimal digits"),
         ("another game id", Set(1, "/header/gameId", json!("22b73f3bba773c1120e1858de68cd802")), 4, "gameStarted.gameId"),
         ("a rule", Set(1, "/header/rules/points", json!([3, 2, 1, 0])), 4, "gameStarted.rules.points is [5,3,1,0] and must be [3,2,1,0]"),
+        ("too many clocks", Set(1, "/header/policy/clocks", json!(vec![json!({}); 5])), 1, "has more than 4 entries in `clocks`"),
         ("an impossible rule", Set(1, "/header/rules/faces", json!(16)), 1, "rules.faces"),
         ("a missing rule", Unset(1, "/header/rules", "exchange"), 1, "rules.exchange"),
         ("the action space", Set(1, "/header/actionSpace/size", json!(215)), 1, "actionSpace.size is 215 and must be 214"),
@@ -189,6 +190,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         // Lines.
         ("no header", Drop(1), 1, "the first line must be the header"),
         ("two headers", Double(1), 2, "is a second header: a file holds one record"),
+        ("two starts", Double(4), 5, "starts the game a second time"),
         ("a decision dropped", Drop(8), 8, "`play` follows from no decision"),
         ("an event dropped", Drop(9), 9, "`play` must come here"),
         ("the game's end dropped", Drop(492), 492, "the footer comes here, but the game is not over"),
