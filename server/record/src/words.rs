@@ -83,8 +83,9 @@ pub fn from_data_url(media: &str) -> Option<String> {
 
 /// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
 pub fn to_data_url(words: &str) -> String {
-    let mut media = encoded(words);
-    let mut cut = words.to_owned();
+    // All is encoded again for each character that is too many, and each takes a byte at least.
+    let mut cut: String = words.chars().take(MAX_MEDIA).collect();
+    let mut media = encoded(&cut);
     while media.len() > MAX_MEDIA {
         cut.pop();
         media = encoded(&format!("{}…", cut.trim_end()));
@@ -133,6 +134,9 @@ mod tests {
             long.len() <= MAX_MEDIA && long.ends_with("%E2%80%A6"),
             "{long}"
         );
+        // As the same words without what is far too long, and at once.
+        let endless = "è ".repeat(1_000_000);
+        assert_eq!(to_data_url(&endless), long);
         assert_eq!(from_data_url("https://example.org/a.wav"), None);
     }
 }
