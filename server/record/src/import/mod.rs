@@ -13,8 +13,8 @@ mod start;
 mod transcript;
 
 use chefshat_engine::{
-    Action, ActionSpace, BySeat, DecisionKind, Event, Game, RULES_VERSION, RewardScheme, Role,
-    RuleSet, Seat,
+    Action, ActionSpace, BySeat, DecisionKind, Event, Game, MAX_SEATS, RULES_VERSION, RewardScheme,
+    Role, RuleSet, Seat,
 };
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_referee::{PhysicalGame, ShiftFacts, StartState};
@@ -73,7 +73,8 @@ struct Importer {
     elapsed_ms: u64,
     /// Chosen gifts the engine has not asked for yet.
     gifts: Vec<Stated>,
-    attempts: Vec<(Seat, u32)>,
+    /// Illegal plays that each seat took back since its last decision.
+    attempts: [Vec<u32>; MAX_SEATS],
     ruled: RuledShifts,
 }
 
@@ -131,7 +132,7 @@ impl Importer {
             events: 0,
             elapsed_ms: 0,
             gifts: Vec::new(),
-            attempts: Vec::new(),
+            attempts: Default::default(),
             ruled: RuledShifts::default(),
         }
     }
@@ -151,7 +152,7 @@ impl Importer {
         for row in rows {
             self.row(row)?;
         }
-        if let Some((seat, _)) = self.attempts.first() {
+        if let Some(seat) = self.attempts.iter().position(|tried| !tried.is_empty()) {
             return Err(wrong(
                 transcript.last_line,
                 format!("seat {seat} tried a play, but its turn is missing"),
@@ -220,7 +221,7 @@ impl Importer {
                 let action = self.space().encode(*attempt);
                 let action =
                     action.ok_or_else(|| at("no deck has that many cards of one face".into()))?;
-                self.attempts.push((row.seat, action.index().into()));
+                self.attempts[row.seat.index()].push(action.index().into());
                 Ok(())
             }
             Entry::Turn(turn) => {
@@ -278,12 +279,10 @@ impl Importer {
             .encode(stated.action)
             .ok_or("no deck has that many cards of one face")?;
         let legal = game.legal_actions();
-        let (attempts, others) = self.attempts.iter().partition(|(tried, _)| *tried == seat);
-        let attempts: Vec<(Seat, u32)> = attempts;
-        self.attempts = others;
-        if let Some((_, tried)) = attempts
+        let attempts = std::mem::take(&mut self.attempts[seat.index()]);
+        if let Some(tried) = attempts
             .iter()
-            .find(|(_, tried)| known[seat] && legal.contains(action_id(*tried)))
+            .find(|tried| known[seat] && legal.contains(action_id(**tried)))
         {
             let text = space.text(action_id(*tried)).unwrap_or_default();
             return Err(format!(
@@ -295,7 +294,6 @@ impl Importer {
             .map_err(|error| error.to_string())?;
         self.decisions[seat] += 1;
         let mut record = stated.record;
-        let attempts = attempts.into_iter().map(|(_, tried)| tried);
         record.invalid_attempts.extend(attempts);
         let attempts = record.invalid_attempts.len();
         let record = v1::DecisionRecord {
