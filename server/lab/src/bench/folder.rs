@@ -63,7 +63,7 @@ pub(super) struct Folder {
     pub(super) task: Task,
     manifest: Manifest,
     /// Held by the run that adds records.
-    _lock: Option<File>,
+    lock: Option<File>,
 }
 
 impl Folder {
@@ -79,7 +79,7 @@ impl Folder {
             path: path.to_owned(),
             task,
             manifest,
-            _lock: None,
+            lock: None,
         })
     }
 
@@ -96,7 +96,7 @@ impl Folder {
         let named = |error| format!("{}: {error}; name another with --out", path.display());
         fs::create_dir_all(path).map_err(named)?;
         let folder = Self {
-            _lock: locked(path)?,
+            lock: locked(path)?,
             path: path.to_owned(),
             task: task.clone(),
             manifest: Manifest {
@@ -130,6 +130,10 @@ impl Folder {
                 )
                 .into());
             }
+        }
+        if folder.lock.is_some() {
+            // Of a run that was killed: whoever gets the folder would get these too.
+            jsonl::remove_unfinished(path).map_err(named)?;
         }
         write_json(&file, &folder.manifest)?;
         Ok(folder)
@@ -296,7 +300,7 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     Ok(file.finish()?)
 }
 
-/// Locks a folder, where folders can be opened.
+/// Locks a folder, where folders can be opened and locked.
 fn locked(path: &Path) -> Result<Option<File>, CommandError> {
     if !cfg!(unix) {
         return Ok(None);
@@ -308,7 +312,8 @@ fn locked(path: &Path) -> Result<Option<File>, CommandError> {
             path.display()
         )
         .into()),
+        Ok(()) => Ok(Some(folder)),
         // Some file systems have no locks.
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(folder)),
+        Err(TryLockError::Error(_)) => Ok(None),
     }
 }

@@ -109,8 +109,11 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     let whole = run("small_deck", &folder, &["--agent", "greedy"]);
     let record = |deal: usize| folder.join("records").join(format!("{deal:04}.jsonl"));
     fs::remove_file(record(2)).unwrap();
+    let unfinished = folder.join("records/0002.jsonl.x7Qz1a.part");
+    fs::write(&unfinished, "of a run that was killed").unwrap();
     let again = run("small_deck", &folder, &["--agent", "greedy"]);
     assert_eq!(again.stdout, whole.stdout);
+    assert!(!cfg!(unix) || !unfinished.exists());
     assert!(
         again.stderr.contains("3 games, 1 are played now"),
         "{again:?}"
