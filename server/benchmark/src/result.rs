@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use chefshat_agents::NamedAgent;
 use chefshat_record::language_model::ModelUsage;
 use chefshat_record::outcome::Identity;
+use chefshat_record::words::has_invisible;
 use chefshat_tournament::statistics::{Moments, wilson95};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -29,13 +31,16 @@ pub struct AgentInfo {
 }
 
 impl AgentInfo {
-    /// Whether its texts may be shown: a name of 1..=64 characters, others of at most 2000, and none
-    /// that are control characters.
+    /// Whether its texts may be shown: a name of 1..=64 characters without invisible ones or blanks
+    /// around it, which would make it look like another, and others of at most 2000 characters, none of
+    /// which are control characters.
     pub fn is_printable(&self) -> bool {
         let fits =
             |text: &str, most| text.chars().count() <= most && !text.chars().any(char::is_control);
         !self.name.is_empty()
             && fits(&self.name, 64)
+            && self.name.trim() == self.name
+            && !has_invisible(&self.name)
             && fits(&self.description, 2000)
             && fits(&self.url, 2000)
     }
@@ -136,6 +141,16 @@ impl TaskResult {
         if let [first, second, ..] = &*played_by {
             problems.push(format!(
                 "several participants played, such as {first} and {second}"
+            ));
+        }
+        let named = agent.name.parse::<NamedAgent>().ok();
+        if let Some(named) = named.map(|named| named.name())
+            && let Some(other) = (games.iter().map(|game| &game.player))
+                .find(|player| !player.built_in || player.name != named)
+        {
+            let other = in_words(other);
+            problems.push(format!(
+                "{named} is the name of a built-in agent, but {other} played"
             ));
         }
         if fallback_decisions as f64 > MAX_FALLBACKS * choices as f64 {

@@ -367,6 +367,25 @@ fn a_result_counts_with_all_deals_and_its_own_decisions() {
         },
         ..game(5, 0).expect("it has a score")
     });
+    // A row of a table does not say who played.
+    let four = [(); 4].map(|()| game(5, 0));
+    let greedy = AgentInfo {
+        name: "greedy".to_owned(),
+        ..AgentInfo::default()
+    };
+    assert_eq!(
+        TaskResult::of(&task, greedy.clone(), &four).problems,
+        ["greedy is the name of a built-in agent, but Mia played"]
+    );
+    let built_in = four.clone().map(|game| {
+        let player = Identity {
+            name: "greedy".to_owned(),
+            built_in: true,
+            ..player.clone()
+        };
+        game.map(|game| GameScore { player, ..game })
+    });
+    assert!(TaskResult::of(&task, greedy, &built_in).is_valid());
     let mixed = result(&[game(5, 0), other, game(5, 0), game(5, 0)]);
     assert_eq!(
         mixed.problems,
@@ -388,13 +407,23 @@ fn a_result_counts_with_all_deals_and_its_own_decisions() {
 }
 
 #[test]
-fn texts_that_move_the_cursor_are_not_shown() {
+fn texts_that_move_the_cursor_or_look_like_others_are_not_shown() {
     let named = |name: &str| AgentInfo {
         name: name.to_owned(),
         ..AgentInfo::default()
     };
     assert!(named("Größe 7").is_printable());
-    for name in ["", "\u{1b}[2J", "a\nb", &"a".repeat(65)] {
+    let looks_like_another = [
+        "greedy\u{200b}",
+        "\u{202e}ydeerg",
+        " greedy",
+        "greedy\u{a0}",
+    ];
+    let too_long = "a".repeat(65);
+    for name in ["", "\u{1b}[2J", "a\nb", &too_long]
+        .into_iter()
+        .chain(looks_like_another)
+    {
         assert!(!named(name).is_printable(), "{name:?}");
     }
 }

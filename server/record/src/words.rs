@@ -38,6 +38,18 @@ pub fn is_invisible(letter: char) -> bool {
         | '\u{1d173}'..='\u{1d17a}' | '\u{e0000}'..='\u{e0fff}')
 }
 
+/// Whether a text has characters that are not seen: control characters and invisible ones. The sign
+/// that a symbol is a picture (U+FE0F), which keyboards add to some, counts as seen after one.
+pub fn has_invisible(text: &str) -> bool {
+    let mut before = None;
+    text.chars().any(|letter| {
+        let is_symbol = |it: char| !it.is_ascii() && !it.is_alphanumeric() && !is_invisible(it);
+        let is_sign = letter == '\u{fe0f}' && before.is_some_and(is_symbol);
+        before = Some(letter);
+        letter.is_control() || is_invisible(letter) && !is_sign
+    })
+}
+
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
 pub fn ordinal(place: u32) -> String {
     let ending = match (place % 100, place % 10) {

@@ -237,7 +237,12 @@ pub(super) fn read_result(path: &Path, key: Option<&DealsKey>) -> Result<TaskRes
     }
     let mut result: TaskResult = read_json(path)?;
     check_agent(path, &result.agent)?;
-    task_of(&result.benchmark, &result.task)?;
+    let task = task_of(&result.benchmark, &result.task)?;
+    // The agent that it is compared with plays as many.
+    if result.by_deal.len() > task.deals {
+        let (path, deals) = (path.display(), task.deals);
+        return Err(format!("{path}: the task has {deals} deals").into());
+    }
     result.problems = vec![NOT_CHECKED.to_owned()];
     Ok(result)
 }
@@ -276,8 +281,8 @@ fn check_agent(path: &Path, agent: &AgentInfo) -> Result<(), CommandError> {
     }
     let path = path.display();
     Err(format!(
-        "{path}: the name of an agent has 1 to 64 characters, its description and its url at most 2000, \
-         and none of them control characters"
+        "{path}: the name of an agent has 1 to 64 characters, none of them invisible, and no blanks around them; \
+         its description and its url have at most 2000, and no control characters"
     )
     .into())
 }

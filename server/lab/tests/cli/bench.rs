@@ -153,6 +153,13 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     assert!(table.stderr.contains("left out: nowhere"), "{table:?}");
     assert_eq!(table.code, Some(1));
     table.assert_says(&["not checked", "2 of 2500 deals"]);
+    // One of more deals than there are would make the agent that it is compared with play them.
+    let mut endless = whole.json();
+    endless["by_deal"] = vec![Value::Null; 800_000].into();
+    let endless_file = folder.join("endless.json");
+    fs::write(&endless_file, endless.to_string()).unwrap();
+    typed(&format!("bench table {}", endless_file.display()))
+        .assert_failed("the task has 2500 deals");
     assert_eq!(submitted["by_deal"][1], Value::Null);
     assert_eq!(submitted["by_deal"][3], whole.json()["by_deal"][3]);
 }

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use chefshat_record::convert::FieldProblem;
-use chefshat_record::words::is_invisible;
+use chefshat_record::words::has_invisible;
 use sha2::{Digest as _, Sha256};
 
 /// Longest name of a room or participant, characters.
@@ -56,18 +56,6 @@ pub(super) fn checked_text(
         ));
     }
     Ok(text.to_owned())
-}
-
-/// Whether a text has characters that are not seen: control characters and invisible ones. The sign
-/// that a symbol is a picture (U+FE0F), which keyboards add to some, counts as seen after one.
-fn has_invisible(text: &str) -> bool {
-    let mut before = None;
-    text.chars().any(|letter| {
-        let is_symbol = |it: char| !it.is_ascii() && !it.is_alphanumeric() && !is_invisible(it);
-        let is_sign = letter == '\u{fe0f}' && before.is_some_and(is_symbol);
-        before = Some(letter);
-        letter.is_control() || is_invisible(letter) && !is_sign
-    })
 }
 
 #[cfg(test)]
