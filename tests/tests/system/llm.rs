@@ -427,7 +427,11 @@ async fn without_usable_answers_the_fallback_plays_and_soon_nobody_asks_any_more
     };
     let forbidden: Script = |number, messages| match number {
         0 => honest(number, messages),
-        _ => Said::Other(StatusCode::UNAUTHORIZED, b"no".to_vec()),
+        // What the record does not show.
+        _ => {
+            let body = json!({"error": {"message": "Ada's account is closed"}});
+            Said::Other(StatusCode::UNAUTHORIZED, body.to_string().into_bytes())
+        }
     };
     let broken: Script = |number, messages| match number {
         0 => honest(number, messages),
@@ -457,6 +461,7 @@ async fn without_usable_answers_the_fallback_plays_and_soon_nobody_asks_any_more
                 _ => "no usable answers before in this Shift",
             };
             assert!(said.starts_with(&format!("greedy: {expected}")), "{said}");
+            assert!(!said.contains("account"), "{said}");
         }
         assert_eq!(played.questions(), 3 * attempts);
     }
@@ -492,7 +497,10 @@ async fn an_answer_in_any_usual_form_is_read() {
             3 => json!({"content": format!("I play **action {action}**.")}),
             _ => json!({"content": cards}),
         };
-        Said::Whole(json!({"choices": [{"message": message, "finish_reason": "stop"}]}))
+        Said::Whole(json!({
+            "choices": [{"message": message, "finish_reason": "stop"}],
+            "usage": {"total_tokens": -1, "prompt_tokens": 3.5},
+        }))
     };
     let played = play(forms, AMPLE, &["--extra", r#"{"reasoning_effort": "low"}"#]).await;
     let choices = played.choices();

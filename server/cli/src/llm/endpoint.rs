@@ -73,14 +73,24 @@ pub(super) struct Completion {
 }
 
 /// Why there is no completion.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum EndpointError {
-    /// Trying again may help, after this time at the earliest.
-    #[error("{problem}")]
-    Passing { problem: String, pause: Duration },
-    /// It would be the same again.
-    #[error("{0}")]
-    Lasting(String),
+#[derive(Debug)]
+pub(super) struct EndpointError {
+    /// In the words of this program.
+    pub(super) problem: String,
+    /// In those of the server, without the key. They may name an account, which no record shows.
+    pub(super) words: Option<String>,
+    /// Trying again may help, after this time at the earliest; `None`: it would be the same again.
+    pub(super) pause: Option<Duration>,
+}
+
+impl fmt::Display for EndpointError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.problem)?;
+        match &self.words {
+            Some(words) => write!(f, ": {words}"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// A server of language models.
@@ -102,8 +112,9 @@ pub(crate) struct Endpoint {
 struct Answered {
     #[serde(default)]
     choices: Vec<Choice>,
+    /// A [`Reported`], if it can be read: without it an answer is still one.
     #[serde(default)]
-    usage: Option<Reported>,
+    usage: Value,
 }
 
 #[derive(Deserialize)]
@@ -256,14 +267,12 @@ impl Endpoint {
             attempts += 1;
             match self.complete(&question, FIRST_ANSWER).await {
                 Ok(_) => return Ok(()),
-                Err((EndpointError::Passing { pause, .. }, _))
-                    if attempts < FIRST_ATTEMPTS && pause <= FIRST_ANSWER =>
-                {
-                    tokio::time::sleep(pause).await;
-                }
-                Err((error, _)) => {
-                    return Err(format!("{} cannot be asked: {error}", self.model));
-                }
+                Err((error, _)) => match error.pause {
+                    Some(pause) if attempts < FIRST_ATTEMPTS && pause <= FIRST_ANSWER => {
+                        tokio::time::sleep(pause).await;
+                    }
+                    _ => return Err(format!("{} cannot be asked: {error}", self.model)),
+                },
             }
         }
     }
@@ -285,15 +294,23 @@ impl Endpoint {
         let asked: usize = messages.iter().map(|message| message.content.len()).sum();
         let answer = self.post(messages, time).await;
         let answer = answer.map_err(|error| self.problem(error, asked))?;
-        let lasting = |problem: &str| (EndpointError::Lasting(problem.to_owned()), at_least(asked));
+        let lasting = |problem: &str| {
+            let error = EndpointError {
+                problem: problem.to_owned(),
+                words: None,
+                pause: None,
+            };
+            (error, at_least(asked))
+        };
         let answered: Answered = serde_json::from_slice(&answer.body)
             .map_err(|_| lasting("the answer is not a chat completion"))?;
         let choice = answered.choices.into_iter().next();
         let choice = choice.ok_or_else(|| lasting("the answer has no choice"))?;
         let cut = choice.finish_reason.as_deref() == Some("length");
         let text = choice.message.text();
-        let usage = answered.usage.as_ref().and_then(Reported::parts);
-        let reported = answered.usage.and_then(|usage| usage.total_tokens);
+        let reported = serde_json::from_value::<Reported>(answered.usage).ok();
+        let usage = reported.as_ref().and_then(Reported::parts);
+        let reported = reported.and_then(|usage| usage.total_tokens);
         let tokens = reported.unwrap_or(0).max(at_least(asked + text.len()));
         Ok(Completion {
             text,
@@ -347,31 +364,32 @@ impl Endpoint {
 
     /// An error in words, and what the question has cost.
     fn problem(&self, error: PostError, asked: usize) -> (EndpointError, u64) {
-        let passing = |problem: String, pause| EndpointError::Passing { problem, pause };
-        match error {
-            PostError::Status(answer) => {
-                let mut problem = format!("the endpoint answered {}", answer.status);
-                if answer.status.is_redirection() {
-                    problem += ", which means another address: give that";
-                }
-                if let Some(words) = self.words_of(&answer.body) {
-                    problem = format!("{problem}: {words}");
-                }
-                let pause = answer.retry_after.unwrap_or(Duration::from_secs(1));
-                let passes = answer.status.is_server_error()
-                    || answer.status == 429
-                    || self.learns_limit(&answer);
-                let error = match passes {
-                    true => passing(problem, pause),
-                    false => EndpointError::Lasting(problem),
-                };
-                (error, 0)
-            }
+        let (pause, tokens) = match &error {
+            PostError::Status(answer) => return (self.refusal(answer), 0),
             // The model may have worked on it.
-            error @ (PostError::Timeout(_) | PostError::Body(_)) => {
-                (passing(error.to_string(), Duration::ZERO), at_least(asked))
-            }
-            error => (passing(error.to_string(), Duration::from_secs(1)), 0),
+            PostError::Timeout(_) | PostError::Body(_) => (Duration::ZERO, at_least(asked)),
+            _ => (Duration::from_secs(1), 0),
+        };
+        let error = EndpointError {
+            problem: error.to_string(),
+            words: None,
+            pause: Some(pause),
+        };
+        (error, tokens)
+    }
+
+    /// A refusal of the server.
+    fn refusal(&self, answer: &Answer) -> EndpointError {
+        let mut problem = format!("the endpoint answered {}", answer.status);
+        if answer.status.is_redirection() {
+            problem += ", which means another address: give that";
+        }
+        let passes =
+            answer.status.is_server_error() || answer.status == 429 || self.learns_limit(answer);
+        EndpointError {
+            problem,
+            words: self.words_of(&answer.body),
+            pause: passes.then(|| answer.retry_after.unwrap_or(Duration::from_secs(1))),
         }
     }
 

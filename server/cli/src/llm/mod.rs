@@ -33,7 +33,7 @@ use crate::language::{self, RULES, cards, text};
 use crate::narration::view::GameView;
 use crate::remote::{RemoteAgent, named_agent};
 pub(crate) use endpoint::Endpoint;
-use endpoint::{EndpointError, Message};
+use endpoint::Message;
 use reply::Reply;
 
 /// The name of the agent on the command line.
@@ -425,8 +425,11 @@ impl LanguageModel {
                     if tokens > 0 {
                         self.spend(tokens, None);
                     }
-                    problem = error.to_string();
-                    let EndpointError::Passing { pause, .. } = error else {
+                    if let Some(words) = &error.words {
+                        warn!(words, "{}", error.problem);
+                    }
+                    problem = error.problem;
+                    let Some(pause) = error.pause else {
                         break;
                     };
                     if pause > until.saturating_duration_since(Instant::now()) {
