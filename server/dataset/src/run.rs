@@ -22,6 +22,9 @@ use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
 
+/// Bytes of the longest version of a server.
+const MAX_VERSION_BYTES: usize = 40;
+
 /// A failed export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -152,8 +155,18 @@ impl Exported {
         for seat in &info.seats {
             *self.kinds.entry(seat.kind).or_default() += 1;
         }
-        self.servers.insert(info.server_version.clone());
+        self.servers
+            .insert(version(&info.server_version).to_owned());
         self.rules_versions.insert(info.rules_version);
+    }
+}
+
+/// The version of a server as the card shows it: nobody checks what a record says there.
+fn version(stated: &str) -> &str {
+    let fits = |byte: u8| byte.is_ascii_alphanumeric() || b".+-_".contains(&byte);
+    match stated.len() <= MAX_VERSION_BYTES && stated.bytes().all(fits) {
+        true => stated,
+        false => "other",
     }
 }
 

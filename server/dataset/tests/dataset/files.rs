@@ -131,6 +131,29 @@ fn the_card_is_readable_by_hubs_and_people() {
     assert!(card.contains("| games | 1 (1 finished, 0 aborted) |"));
 }
 
+/// A record may say anything about its server.
+#[test]
+fn a_card_has_no_text_of_a_record() {
+    let versions = ["0.3.0-rc.1+b47cdd4", "1 |\n\n<img src=x>", &"9".repeat(41)];
+    let records = (1..).zip(versions).map(|(number, version)| {
+        let mut lines = a_record(number);
+        if let Some(Line::Header(header)) = &mut lines[0].line {
+            header.server_version = version.to_owned();
+        }
+        (format!("{number}.jsonl"), lines)
+    });
+    let records: Vec<(String, _)> = records.collect();
+    let named: Vec<_> = (records.iter())
+        .map(|(name, lines)| (name.as_str(), lines.clone()))
+        .collect();
+    let stage = Stage::new(&named);
+    stage.run(&stage.export()).unwrap();
+    let card = std::fs::read_to_string(stage.out().join("README.md")).unwrap();
+    let line = "| server version | 0.3.0-rc.1+b47cdd4, other |\n";
+    assert!(card.contains(line), "{card}");
+    assert!(!card.contains("<img"), "{card}");
+}
+
 /// A Parquet value in the encoding of JSON Lines, with times in microseconds.
 fn json(field: &Field) -> Value {
     match field {
