@@ -8,7 +8,8 @@ use chefshat_proto::v1::{self, DecisionKind, game_event::Kind, record_line::Line
 use super::game::GameInfo;
 use super::python;
 use super::sheet::{Row, Sheet};
-use chefshat_record::replay::{Moment, ReplayError, walk};
+use chefshat_record::jsonl::Record;
+use chefshat_record::replay::{Moment, ReplayError, walk_file};
 
 /// The source of rows without a player.
 const SYSTEM: &str = "SYSTEM";
@@ -17,9 +18,9 @@ const SYSTEM: &str = "SYSTEM";
 ///
 /// # Errors
 /// The first wrong line.
-pub(super) fn lay_out(lines: &[v1::RecordLine], info: &GameInfo) -> Result<Sheet, ReplayError> {
+pub(super) fn lay_out(record: &Record, info: &GameInfo) -> Result<Sheet, ReplayError> {
     let mut writer = Writer::new(info);
-    let replayed = walk(lines, |moment| writer.take(moment))?;
+    let replayed = walk_file(record, |moment| writer.take(moment))?;
     Ok(Sheet {
         rows: writer.rows,
         decisions: replayed.decisions,

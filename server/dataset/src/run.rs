@@ -130,7 +130,7 @@ impl Export {
         let game = match self.layout {
             Layout::Tables => gather(&record).map(Game::Rows),
             Layout::ChefsHatGym => checked_info(&record.lines).and_then(|info| {
-                let sheet = lay_out(&record.lines, &info)?;
+                let sheet = lay_out(&record, &info)?;
                 Ok(Game::Sheet(Box::new(info), sheet))
             }),
         };

@@ -11,7 +11,7 @@ use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
 use chefshat_record::outcome::{Identity, Unrated};
 use chefshat_record::rated::rated;
-use chefshat_record::replay::replay;
+use chefshat_record::replay::walk_file;
 use chefshat_record::summary::summary;
 use chefshat_tournament::ratings::{Finish, Ratings};
 use clap::Args;
@@ -153,11 +153,12 @@ struct ReadRecord {
 
 /// Reads and verifies a record.
 fn read(path: &Path) -> Result<ReadRecord, String> {
-    let lines = jsonl::read(path).map_err(|error| match error {
+    let record = jsonl::read_record(path).map_err(|error| match error {
         jsonl::RecordFileError::Io { source, .. } => source.to_string(),
         jsonl::RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
     })?;
-    let replayed = replay(&lines).map_err(|error| error.to_string())?;
+    let replayed = walk_file(&record, |_| {}).map_err(|error| error.to_string())?;
+    let lines = record.lines;
     let game_id = match lines.first().and_then(|line| line.line.as_ref()) {
         Some(v1::record_line::Line::Header(header)) => header.game_id.clone(),
         _ => String::new(),
