@@ -18,7 +18,7 @@ pub use network::{
     NetworkOutput, table_features,
 };
 pub use participant::ParticipantKind;
-pub use play::{Answer, Listener, ask, is_wrong_action, play, play_agents};
+pub use play::{Answer, DecisionNotes, Listener, ask, is_wrong_action, play, play_agents};
 pub use recorded::{MAX_MODELS, RecordedPlayer};
 pub use seeds::{agent_seed, game_seed, seating_agent_seed};
 pub use text::shortened;

@@ -5,8 +5,8 @@ use std::cell::RefCell;
 use std::num::NonZeroU32;
 
 use chefshat_engine::{
-    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, RuleSet, Seat, Seed,
-    Standings, Viewer,
+    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, PlayedDecision, RuleSet,
+    Seat, Seed, Standings, Viewer,
 };
 
 use crate::BuiltInAgent;
@@ -27,6 +27,46 @@ pub trait Listener {
     /// Called when a seat answers with an illegal action.
     fn on_invalid(&mut self, decision: Decision, action: ActionId) {
         let _ = (decision, action);
+    }
+}
+
+/// The decisions of a game, each after its invalid attempts, as a record has them.
+#[derive(Debug, Default)]
+pub struct DecisionNotes {
+    /// After how many invalid attempts the default action is taken; `None`: never.
+    limit: Option<NonZeroU32>,
+    decisions: Vec<PlayedDecision>,
+    attempts: Vec<ActionId>,
+}
+
+impl DecisionNotes {
+    /// Notes of a game with this limit of invalid attempts.
+    pub fn new(limit: Option<NonZeroU32>) -> Self {
+        Self {
+            limit,
+            ..Self::default()
+        }
+    }
+
+    /// The decisions so far.
+    pub fn decisions(&self) -> &[PlayedDecision] {
+        &self.decisions
+    }
+}
+
+impl Listener for DecisionNotes {
+    fn on_invalid(&mut self, _: Decision, action: ActionId) {
+        self.attempts.push(action);
+    }
+
+    fn on_decision(&mut self, _: Decision, action: ActionId) {
+        let attempts = std::mem::take(&mut self.attempts);
+        let by_default = |limit: NonZeroU32| attempts.len() >= limit.get() as usize;
+        self.decisions.push(PlayedDecision {
+            action,
+            by_default: self.limit.is_some_and(by_default),
+            attempts,
+        });
     }
 }
 

@@ -1,7 +1,7 @@
 //! The games of a task in this process, with an agent that is built in or a network file.
 
-use chefshat_agents::{BuiltInAgent, Listener, play_agents};
-use chefshat_engine::{ActionId, BySeat, Decision, PlayedDecision, Seat};
+use chefshat_agents::{BuiltInAgent, DecisionNotes, play_agents};
+use chefshat_engine::{BySeat, Seat};
 use chefshat_proto::v1;
 use chefshat_record::convert::Played;
 use chefshat_search::named_agent;
@@ -27,7 +27,7 @@ pub fn play_offline(
             None => own_agent.take().expect("it has one seat")(seed),
         });
     }
-    let mut notes = Notes::default();
+    let mut notes = DecisionNotes::default();
     play_agents(rules, seed, None, &mut agents, &mut notes);
     let names: Vec<String> = (opponents.iter())
         .map(|opponent| opponent.map_or_else(|| name.to_owned(), |agent| agent.name()))
@@ -39,21 +39,7 @@ pub fn play_offline(
         seed,
         scheme: None,
         policy: &task.policy(),
-        decisions: &notes.0,
+        decisions: notes.decisions(),
     };
     played.record()
-}
-
-/// The decisions of a game.
-#[derive(Default)]
-struct Notes(Vec<PlayedDecision>);
-
-impl Listener for Notes {
-    fn on_decision(&mut self, _: Decision, action: ActionId) {
-        self.0.push(PlayedDecision {
-            action,
-            by_default: false,
-            attempts: Vec::new(),
-        });
-    }
 }
