@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
 use chefshat_cli::error::{CommandError, is_broken_pipe};
-use chefshat_cli::progress;
+use chefshat_cli::{numbers, progress};
 
 const HELP: &str = "\
 A vector file has one JSON object per line, either a deal (rules, seed, shift, hands, leader) or a complete game (rules, seed, steps, \
@@ -112,12 +112,14 @@ fn counted(agreed: &Agreed) -> String {
         games,
         steps,
     } = agreed;
-    let games_and_steps = format!("{games} games ({steps} decisions)");
+    let of_deals = numbers::counted(*deals, "deal");
+    let steps = numbers::counted(*steps, "decision");
+    let of_games = format!("{} ({steps})", numbers::counted(*games, "game"));
     match (deals, games) {
         (0, 0) => "none".to_owned(),
-        (_, 0) => format!("{deals} deals"),
-        (0, _) => games_and_steps,
-        _ => format!("{deals} deals, {games_and_steps}"),
+        (_, 0) => of_deals,
+        (0, _) => of_games,
+        _ => format!("{of_deals}, {of_games}"),
     }
 }
 

@@ -59,10 +59,8 @@ pub(super) async fn play(
         Some(_) => None,
         None => Some(Host::in_memory(None).await?),
     };
-    let url = match (server, &host) {
-        (Some(server), _) => server.to_owned(),
-        (None, host) => host.as_ref().map(Host::url).unwrap_or_default(),
-    };
+    let own = host.as_ref().map(Host::url);
+    let url = server.map(str::to_owned).or(own).unwrap_or_default();
     // The process of the agent inherits these variables.
     let token = env::var("CHEFSHAT_TOKEN").ok();
     let ca = env::var_os("CHEFSHAT_CA").map(Into::into);

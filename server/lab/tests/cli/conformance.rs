@@ -36,7 +36,7 @@ fn the_vectors_agree() {
     for (file, expected, counts) in [
         (
             "games.jsonl",
-            "all agree: 57 games (29553 decisions)",
+            "all agree: 57 games (29,553 decisions)",
             (0, 57, 29_553),
         ),
         ("deals.jsonl", "all agree: 87 deals", (87, 0, 0)),
