@@ -1,13 +1,14 @@
 """What the training commands share."""
 
+import argparse
 import os
 import signal
 from pathlib import Path
 
 import pytest
 
-from chefshat.learn import runs
-from chefshat.learn.__main__ import parse
+from chefshat.learn import ppo_command, runs
+from chefshat.learn.__main__ import main, parse
 
 
 def test_given_options_are_distinguished_from_defaults() -> None:
@@ -31,6 +32,20 @@ def test_impossible_plans_are_refused(option: str, values: tuple[str, ...], word
         with pytest.raises(SystemExit):
             parse(["ppo", "--out", "o", "--minutes", "1", f"{option}={value}"])
         assert words in capsys.readouterr().err
+
+
+def test_a_command_is_stored_without_its_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    stored: list[str] = []
+
+    def run(options: argparse.Namespace) -> int:
+        stored.append(options.trained_by)
+        return 0
+
+    monkeypatch.setattr(ppo_command, "run", run)
+    secrets = ["--token", "T0k=n", "--secret=0wner", "--sec", "t1cket"]
+    assert main(["ppo", "--out", "o", "--minutes", "1", *secrets, "--seed", "7"]) == 0
+    (command,) = stored
+    assert command == "python -m chefshat.learn ppo --out o --minutes 1 --token ... --secret=... --sec ... --seed 7"
 
 
 def test_a_limited_number_of_commands_is_stored() -> None:

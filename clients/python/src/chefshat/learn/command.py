@@ -42,8 +42,9 @@ class Program:
 
     def main(self, arguments: Sequence[str] | None = None) -> int:
         """Runs the command and returns its exit code."""
-        options = self.parse(arguments)
-        options.trained_by = shlex.join(["python", "-m", self.module, *(sys.argv[1:] if arguments is None else arguments)])
+        given = sys.argv[1:] if arguments is None else arguments
+        options = self.parse(given)
+        options.trained_by = shlex.join(["python", "-m", self.module, *_without_secrets(given, options)])
         try:
             return int(importlib.import_module(options.module).run(options))
         except ModuleNotFoundError as error:
@@ -77,6 +78,17 @@ class Program:
             command.add_argument("--json", action="store_true", help="print one line of JSON instead of text")
             add_options(command)
         return parser.parse_args(arguments)
+
+
+def _without_secrets(arguments: Sequence[str], options: argparse.Namespace) -> list[str]:
+    """Returns the arguments as networks and logs have them, which people publish: with "..." for a token and other secrets."""
+    secrets = [secret for secret in (getattr(options, "token", None), *getattr(options, "secret", ())) if secret]
+
+    def shown(argument: str) -> str:
+        found = (secret for secret in secrets if argument == secret or argument.endswith(f"={secret}"))
+        return next((f"{argument.removesuffix(secret)}..." for secret in found), argument)
+
+    return list(map(shown, arguments))
 
 
 class Given(argparse.Action):
