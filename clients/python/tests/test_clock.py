@@ -3,12 +3,14 @@
 import asyncio
 import itertools
 import time
+from typing import Any
 
 import pytest
 from fake_server import CLOCK_AHEAD_S, FakeServer
 
 import chefshat
 from chefshat import ChefsHatError, ClockReading, aio, pb
+from chefshat.clock import RoomClock
 
 
 def test_four_times_give_the_offset_and_the_round_trip() -> None:
@@ -50,6 +52,28 @@ def test_the_offset_is_known_to_half_the_round_trip(fake: FakeServer) -> None:
         with pytest.raises(ChefsHatError) as caught:
             client.read_clock("nobody's")
         assert caught.value.reason == "ROOM_UNKNOWN"
+
+
+def test_a_reading_that_contradicts_the_one_in_use_replaces_it() -> None:
+    # Offset of the room and error of each reading, and the local time after it.
+    readings = [(100.0, 0.001, 50.0), (100.01, 0.02, 51.0), (3700.0, 0.02, 52.0), (7300.0, 0.03, -3548.0)]
+    times = iter([time for _, _, time in readings])
+
+    class Server:
+        def __init__(self) -> None:
+            self.left = [ClockReading(0.0, 2 * error, offset) for offset, error, _ in readings]
+
+        def read_clock(self, room_id: str, *, local: object) -> ClockReading:
+            return self.left.pop(0)
+
+    server: Any = Server()
+    with RoomClock(server, "room", local=lambda: next(times), interval_s=3600.0) as clock:
+        offsets = [clock.reading.room_offset]
+        for _ in readings[1:]:
+            clock.read()
+            offsets.append(clock.reading.room_offset)
+    # One is less precise, this machine sleeps for an hour, and its clock is set back by one.
+    assert offsets == [100.0, 100.0, 3700.0, 7300.0]
 
 
 @pytest.mark.server

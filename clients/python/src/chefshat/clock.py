@@ -142,12 +142,16 @@ class RoomClock:
         return round(((self._local() if at is None else at) + offset) * 1e6)
 
     def read(self, *, jumped: bool = False) -> None:
-        """Reads the clock again. A less precise reading does not replace a recent one, unless the server's clock has jumped."""
+        """Reads the clock again. A less precise reading does not replace a recent one, unless one of the clocks has jumped.
+
+        That is so if `jumped` says it, or if the readings contradict each other, as after this machine has slept.
+        """
         reading, at = self._read()
         with self._lock:
             self._readings += 1
             aged = self._reading.error + DRIFT * (at - self._read_at)
-            if jumped or reading.error <= aged:
+            apart = abs((reading.room_offset or 0.0) - (self._reading.room_offset or 0.0))
+            if jumped or reading.error <= aged or apart > reading.error + aged:
                 self._reading, self._read_at = reading, at
 
     def close(self) -> None:
