@@ -78,8 +78,9 @@ def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
-def test_a_request_whose_response_was_lost_is_repeated_with_its_id(*, asynchronous: bool) -> None:
-    method = Method(Lost(), Lost())
+@pytest.mark.parametrize("code", [grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN])
+def test_a_request_whose_response_was_lost_is_repeated_with_its_id(code: grpc.StatusCode, *, asynchronous: bool) -> None:
+    method = Method(Lost(code), Lost(code))
     request = pb.JoinRoomRequest(join_code="ABCDEFGH")
     joined = asyncio.run(requests.awaited(method.awaited, request)) if asynchronous else requests.called(method, request)
     assert joined == "joined"
@@ -129,7 +130,7 @@ def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(
 
 def test_a_server_that_stops_and_starts_again_is_awaited_but_not_for_ever() -> None:
     request = pb.CreateRoomRequest()
-    stopping, away = [Stopping()] * 30, [Lost()] * 20
+    stopping, away = [Stopping()] * 30, [Lost(), Lost(grpc.StatusCode.INTERNAL)] * 10
     method = Method(*stopping, *away)
     assert requests.called(method, request) == "joined"
     assert len(set(method.ids)) == 1

@@ -49,6 +49,8 @@ READING = (
     pb.GetLeaderboardRequest,
 )
 REQUEST_ID_BYTES = 32
+# Reasons of calls without an answer of the server: no connection, or a proxy or a broken stream that has lost it.
+LOST = (grpc.StatusCode.UNAVAILABLE.name, grpc.StatusCode.INTERNAL.name, grpc.StatusCode.UNKNOWN.name)
 # Seconds before each further attempt of a request whose response was lost.
 PAUSES_S = (0.1, 0.2, 0.4)
 # The same while the server that runs its room or tournament cannot be reached: another one takes over within ten seconds.
@@ -297,7 +299,7 @@ def _pauses(request: object) -> dict[str, Iterator[float]]:
     elif not isinstance(request, READING):
         return {}
     return {
-        grpc.StatusCode.UNAVAILABLE.name: iter(PAUSES_S),
+        **dict.fromkeys(LOST, iter(PAUSES_S)),
         OWNER_UNREACHABLE: iter(OWNER_PAUSES_S),
         NODE_NOT_REACHED: iter(OWNER_PAUSES_S),
         SHUTTING_DOWN: iter(RESTART_PAUSES_S),
@@ -308,7 +310,7 @@ def _pause_after(error: grpc.RpcError, pauses: dict[str, Iterator[float]]) -> fl
     """Returns the pause before the next attempt; raises the error if the server refused the call or no attempt is left."""
     failure = from_rpc_error(error)
     if failure.reason == SHUTTING_DOWN and pauses:
-        pauses[grpc.StatusCode.UNAVAILABLE.name] = pauses[SHUTTING_DOWN]
+        pauses.update(dict.fromkeys(LOST, pauses[SHUTTING_DOWN]))
     pause = next(pauses.get(failure.reason, iter(())), None)
     if pause is None:
         raise failure from error
