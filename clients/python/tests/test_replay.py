@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import chefshat
 from chefshat import ChefsHatError, Transitions, VectorEnv, local_server, pb, replay, sample_legal
 from chefshat.columns import NO_SEAT
 from chefshat.local_server import BINARY
+from chefshat.replay import recorded
 from chefshat.transitions import concatenate
 
 # The default row of a dataset.
@@ -335,6 +336,34 @@ def test_games_of_a_server(real_address: str, binary: str) -> None:
     assert made.rewards.sum() == 18
     with pytest.raises(ChefsHatError, match="NO_RECORDS"):
         replay.from_server(real_address, pb.RecordFilter(room_name="no such room"))
+
+
+def test_a_record_that_is_deleted_meanwhile_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Server:
+        """A server that lists three games and has two of them no more."""
+
+        def __init__(self, address: str) -> None:
+            self.records = self
+
+        def __enter__(self) -> "Server":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def list(self, wanted: pb.RecordFilter | None) -> Iterator[pb.RecordSummary]:
+            return iter([pb.RecordSummary(game_id=game) for game in ("a", "b", "c")])
+
+        def read(self, game_id: str) -> Iterator[pb.RecordLine]:
+            if game_id != "b":
+                raise ChefsHatError("GAME_UNKNOWN", "there is no such game")
+            yield pb.RecordLine(header=pb.RecordHeader(game_id=game_id))
+
+    read: list[str] = []
+    monkeypatch.setattr(chefshat.client, "Client", Server)
+    monkeypatch.setattr(recorded, "from_records", lambda folder: read.extend(path.name for path in Path(folder).iterdir()))
+    replay.from_server("127.0.0.1:1")
+    assert read == ["b.jsonl"]
 
 
 @pytest.mark.server

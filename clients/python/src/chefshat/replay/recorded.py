@@ -114,8 +114,14 @@ def from_server(address: str | ServerAddress, wanted: pb.RecordFilter | None = N
     with tempfile.TemporaryDirectory() as folder, Client(address) as client:
         count = 0
         for summary in client.records.list(wanted):
-            save_record(client.records.read(summary.game_id), Path(folder) / f"{summary.game_id}.jsonl")
-            count += 1
+            try:
+                save_record(client.records.read(summary.game_id), Path(folder) / f"{summary.game_id}.jsonl")
+            except ChefsHatError as error:
+                # Old games may be deleted while others are downloaded.
+                if error.reason != "GAME_UNKNOWN":
+                    raise
+            else:
+                count += 1
         if count == 0:
             raise ChefsHatError("NO_RECORDS", f"the server at {address} has no such records")
         return from_records(folder, **options)
