@@ -68,6 +68,15 @@ def test_the_pettingzoo_checker_passes(anywhere: str | None, observation: Any, e
     assert "takes a turn" in printed.getvalue()
 
 
+@pytest.mark.parametrize("kind", ["gymnasium", "pettingzoo"])
+def test_render_without_a_mode_warns_and_shows_nothing(anywhere: str | None, kind: Any) -> None:
+    env: Any = chefshat.make(kind, address=anywhere)
+    env.reset(seed=1)
+    with pytest.warns(UserWarning, match='made with render_mode="ansi" or "human"'):
+        assert env.render() is None
+    env.close()
+
+
 def test_a_random_agent_plays_complete_games(anywhere: str | None) -> None:
     env = chefshat.make("gymnasium", address=anywhere, episode="game", rewards="points", render_mode="ansi")
     env.action_space.seed(1)

@@ -24,7 +24,7 @@ from chefshat.envs.gymnasium_env import check_open, take, wait_for_a_row
 from chefshat.envs.illegal import with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
 from chefshat.envs.options import AllSeatsOptions, EnvOptions
-from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
+from chefshat.envs.rendering import RENDER_MODES, as_text, can_render, check_render_mode
 from chefshat.learn import features
 from chefshat.vector import Batch, VectorEnv
 
@@ -174,6 +174,8 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
 
     def render(self) -> str | None:
         """Formats the situation of the deciding agent as text: returned with "ansi", printed with "human"."""
+        if not can_render(self.render_mode):
+            return None
         situations: Situations = self.vector.batch
         if self.agents and (any(self.terminations.values()) or any(self.truncations.values())):
             situations = self.vector.batch.endings

@@ -16,7 +16,7 @@ from chefshat.envs.copying import NotCopied
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.options import EnvOptions
-from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
+from chefshat.envs.rendering import RENDER_MODES, as_text, can_render, check_render_mode
 from chefshat.errors import ChefsHatError
 from chefshat.vector import Batch, VectorEnv
 
@@ -164,8 +164,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
 
     def render(self) -> str | None:
         """Formats the seat's situation as text: returned with "ansi", printed with "human"."""
-        if self.render_mode is None:
-            gymnasium.logger.warn('render needs an environment made with render_mode="ansi" or "human"')
+        if not can_render(self.render_mode):
             return None
         text = as_text(self._now, 0, self.vector.action_texts)
         if self.render_mode == "ansi":

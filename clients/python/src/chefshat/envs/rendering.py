@@ -1,5 +1,6 @@
 """Formats a seat's situation as text, for `render` of the environments."""
 
+import gymnasium
 import numpy as np
 
 from chefshat import pb
@@ -14,6 +15,13 @@ def check_render_mode(render_mode: str | None) -> None:
     """Raises ValueError if it is neither None nor one of `RENDER_MODES`."""
     if render_mode is not None and render_mode not in RENDER_MODES:
         raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
+
+
+def can_render(render_mode: str | None) -> bool:
+    """Whether an environment was made for `render`. Warns as Gymnasium's and PettingZoo's own do if it was not."""
+    if render_mode is None:
+        gymnasium.logger.warn('render needs an environment made with render_mode="ansi" or "human"')
+    return render_mode is not None
 
 
 def as_text(situations: Situations, row: int, texts: tuple[str, ...]) -> str:
