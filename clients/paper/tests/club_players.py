@@ -5,6 +5,7 @@ They run in separate processes and import only what such players would. Tests cr
 
 import json
 import os
+import subprocess
 import time
 from typing import Any
 
@@ -179,6 +180,20 @@ class Mortal(Largest):
             os.write(2, b"farewell\n")
             os._exit(7)
         return super().get_action(observations)
+
+
+class Parent(Largest):
+    """Starts a program that would never end, writes its process id to a file, and exits."""
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name)
+        self.file = file
+
+    def get_action(self, observations: Any) -> Any:
+        program = subprocess.Popen(["sleep", "3600"])
+        with open(self.file, "w", encoding="utf-8") as opened:
+            opened.write(str(program.pid))
+        os._exit(7)
 
 
 class Hanging(Largest):

@@ -66,6 +66,14 @@ def test_output_of_a_player_is_not_an_answer(make: Make, tmp_path: Path) -> None
     assert (tmp_path / "log").read_text().count('{"id": 2, "value": [0]}\n') == 3
 
 
+def test_a_full_disk_ends_the_log_and_not_the_player(make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    process = make("Babbling", log=Path("/dev/full"))
+    for _ in range(3):
+        process.call("get_action", VECTOR)
+    process.close()
+    assert caplog.text.count("the agent's output is no longer logged") == 1
+
+
 def test_an_exception_is_reported_and_the_process_continues(make: Make) -> None:
     process = make("Raising")
     with pytest.raises(AgentRaised, match="get_action raised RuntimeError: no idea\nTraceback"):
@@ -92,6 +100,15 @@ def test_a_dead_player_is_restarted_and_finally_given_up(make: Make) -> None:
     assert process.given_up
     with pytest.raises(AgentLost, match="has been given up"):
         process.call("get_action", VECTOR)
+
+
+def test_what_a_player_has_started_ends_with_it(make: Make, tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    with pytest.raises(AgentLost, match="exit code 7; it printed nothing"):
+        make("Parent", arguments={"file": str(file)}).call("get_action", VECTOR)
+    stat = Path(f"/proc/{file.read_text()}/stat")
+    # It may have ended without its parent having noticed.
+    wait_until(lambda: not stat.exists() or ") Z " in stat.read_text(), "the program that the player has started ends")
 
 
 def test_a_player_that_hangs_is_ended(make: Make) -> None:

@@ -227,19 +227,21 @@ class _Running:
 
     def end(self) -> None:
         """Kills the process and its children."""
-        # The id of a process that has ended may have been reused.
-        if self._process.poll() is None:
-            with contextlib.suppress(OSError):
-                if hasattr(os, "killpg"):
-                    os.killpg(self._process.pid, signal.SIGKILL)
-                else:
-                    self._process.kill()
-            self._process.wait()
+        self._kill()
+        self._process.wait()
         for reader in self._readers:
             reader.join(FAREWELL_S)
         with contextlib.suppress(OSError):
             if self._process.stdin is not None:
                 self._process.stdin.close()
+
+    def _kill(self) -> None:
+        """Kills what is left of the process and its children. Its group has its id for as long as one of them runs."""
+        with contextlib.suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            else:
+                self._process.kill()
 
     def _read_answers(self, pipe: IO[bytes]) -> None:
         with pipe:
@@ -260,12 +262,17 @@ class _Running:
             while some := os.read(pipe.fileno(), 1 << 16):
                 self._tail = (self._tail + some)[-MAX_TAIL:]
                 if file is not None:
-                    file.write(some)
+                    try:
+                        file.write(some)
+                    except OSError as error:
+                        LOG.warning("the agent's output is no longer logged: %s", error)
+                        file = None
 
     def _how_it_died(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(FAREWELL_S)
-            # Its output ends with it, unless children are still running.
+            # Its children would hold its output open.
+            self._kill()
             self._readers[1].join(FAREWELL_S)
         code = self._process.returncode
         how = "it closed its output" if code is None else f"exit code {code}" if code >= 0 else f"signal {-code}"
