@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chefshat.errors import INTERRUPTED
 from chefshat.learn.figures import Figure, Level, Line, Panel, Points
 
 from chefshat_paper.experiments import Estimate, Result, Table, paper, results, stats
@@ -416,3 +417,12 @@ def test_trained_agents_are_the_same_with_the_same_seed(quick_run: Path, real_ad
     assert main(["rules", "--quick", "--out", str(tmp_path), "--address", real_address]) == 0
     before, again = (results.read(command.results_file(folder, "rules")) for folder in (quick_run, tmp_path))
     assert (again.tables, again.values) == (before.tables, before.values)
+
+
+def test_ctrl_c_has_the_exit_code_of_all_commands(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(options: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run", interrupted)
+    assert main(["mechanics", "--quick"]) == INTERRUPTED
+    assert "the results of finished experiments are saved" in capsys.readouterr().err

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chefshat.errors import INTERRUPTED
 from chefshat.learn import __main__ as command
 from chefshat.learn import curve, network, ppo_checkpoint, ppo_command
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Opponent, Plan
 from chefshat.learn.ppo_training import Trainer
-from chefshat.learn.runs import INTERRUPTED, full_rules
+from chefshat.learn.runs import full_rules
 
 pytestmark = pytest.mark.server
 

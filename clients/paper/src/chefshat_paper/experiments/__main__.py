@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chefshat import join_options
+from chefshat.errors import INTERRUPTED
 
 EXAMPLES = """examples:
   python -m chefshat_paper.experiments all --quick
@@ -18,7 +19,7 @@ EXAMPLES = """examples:
 
 The same seeds give the same results. Without --address the command starts a server of its own.
 
-exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments
+exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments, 130 interrupted
 """
 DEFAULT_SEEDS = 5
 QUICK_SEEDS = 2
@@ -38,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return say_what_is_missing(error)
     except KeyboardInterrupt:
         print("interrupted; the results of finished experiments are saved", file=sys.stderr)
-        return 1
+        return INTERRUPTED
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from chefshat import join_options, pb
-from chefshat.errors import ChefsHatError, failed
+from chefshat.errors import INTERRUPTED, ChefsHatError, failed
 from chefshat.files import check_readable
 from chefshat.learn import features, network, runs, training_log
 from chefshat.learn.evaluation import Evaluation
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
                 "resume by the same command with --resume",
                 file=sys.stderr,
             )
-        return runs.INTERRUPTED
+        return INTERRUPTED
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     summary = {} if played is None else _summary(played)

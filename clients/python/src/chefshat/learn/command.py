@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from chefshat import join_options
+from chefshat.errors import INTERRUPTED
 
 MAX_WIDTH = 4096
 # Adds the options of a command.
@@ -54,7 +55,7 @@ class Program:
             return 1
         except KeyboardInterrupt:
             print("interrupted", file=sys.stderr)
-            return 130
+            return INTERRUPTED
 
     def parse(self, arguments: Sequence[str] | None) -> argparse.Namespace:
         """Parses the options. Exits with 2 if they are wrong, with 0 after --help.

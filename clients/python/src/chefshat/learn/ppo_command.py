@@ -18,7 +18,7 @@ import numpy as np
 from tqdm import tqdm
 
 from chefshat import join_options, pb
-from chefshat.errors import ChefsHatError, failed
+from chefshat.errors import INTERRUPTED, ChefsHatError, failed
 from chefshat.learn import network, plugins, ppo_checkpoint, runs, training_log
 from chefshat.learn.evaluation import Evaluation, OneOpponent
 from chefshat.learn.network import Network
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
             print(f"  {evaluation}")
         if is_stopped:
             print("interrupted: resume by the same command with --resume", file=sys.stderr)
-    return runs.INTERRUPTED if is_stopped else 0
+    return INTERRUPTED if is_stopped else 0
 
 
 def _start(options: argparse.Namespace) -> Training:

@@ -24,8 +24,6 @@ EVALUATION_SEED = 20_200_612
 # Maximum characters of the commands in a file. `chefshat` reads at most 16 KiB of such a text, and a character may be 4 bytes.
 MAX_TRAINED_BY = 4_000
 LEFT_OUT = " [...] "
-# The exit code of a command ended by Ctrl-C.
-INTERRUPTED = 130
 
 
 def full_rules(rules: Rules, address: str | ServerAddress | None) -> pb.RuleSet:
