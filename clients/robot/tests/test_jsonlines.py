@@ -169,6 +169,10 @@ def test_what_the_robot_perceives_is_reported_and_bad_lines_are_ignored(caplog: 
         '{"type": "affect", "label": "joy", "source": "tea leaves"}': "`source` is 'tea leaves'",
         '{"type": "affect", "label": "joy", "seat": -1}': "`seat` is -1",
         '{"type": "heard"}': "`text` is None",
+        # More than a floating-point number, than a time of the protocol, and than can be nested.
+        f'{{"type": "affect", "label": "joy", "valence": {"9" * 400}}}': "it must be a number in -1..1",
+        '{"type": "affect", "label": "joy", "taken_at": 1e300}': "it must be seconds since the Unix epoch",
+        "[" * 50_000: "ignored a line of the robot: not JSON: maximum recursion depth",
     }
     good = {
         '{"type": "heard", "text": "hi", "confidence": 0.5}': Heard("hi", 0.5),

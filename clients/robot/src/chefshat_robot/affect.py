@@ -115,10 +115,7 @@ async def serve_lines(forwarder: Forwarder, host: str, port: int, *, ready: Call
         try:
             while line := await reader.readline():
                 try:
-                    message = json.loads(line)
-                    if not isinstance(message, dict):
-                        raise wire.WireError("a line must be a JSON object")
-                    await forwarder.forward(wire.affect_from_json(message))
+                    await forwarder.forward(wire.affect_from_json(wire.parse(line)))
                 except (ValueError, ChefsHatError) as error:
                     writer.write(json.dumps({"error": str(error)}).encode() + b"\n")
                     await writer.drain()
@@ -174,9 +171,7 @@ async def stream_affects(key: str, value: str) -> AsyncIterator[Affect]:
             ago = pylsl.local_clock() - (stamp + await asyncio.to_thread(inlet.time_correction))
             try:
                 if is_text:
-                    message = json.loads(sample[0])
-                    if not isinstance(message, dict):
-                        raise wire.WireError("a sample must be a JSON object")
+                    message = wire.parse(sample[0])
                 else:
                     read = {label: float(x) for label, x in zip(labels, sample, strict=True)}
                     # NaN says that the analyser does not know, for instance while it sees no face.
@@ -234,10 +229,6 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
 
     return run_command(forward)
-
-
-def _listening(port: int) -> None:
-    LOG.info("listening on port %d", port)
 
 
 def tickets(given: Sequence[str]) -> dict[int | None, str]:

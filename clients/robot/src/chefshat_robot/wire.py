@@ -15,6 +15,7 @@ An event of a robot has a field `type`: "heard" (`text`, `confidence`), "affect"
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -27,10 +28,27 @@ from chefshat_robot.drivers.driver import Act, Affect, Button, CardMove, Heard, 
 from chefshat_robot.table import TableState
 
 SOURCES = ("face", "voice", "self_report", "model")
+# The last second of the year 9999, the last that the protocol's timestamps can express.
+LAST_SECOND = 253_402_300_799
 
 
 class WireError(ValueError):
     """A message that is not of this form. The message says what is wrong."""
+
+
+def parse(line: bytes | str) -> Mapping[str, Any]:
+    """Parses a message.
+
+    Raises:
+        WireError: it is not a JSON object.
+    """
+    try:
+        message = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise WireError(f"not JSON: {error}") from error
+    if not isinstance(message, dict):
+        raise WireError("a message must be a JSON object")
+    return message
 
 
 def act_to_json(act: Act) -> dict[str, Any]:
@@ -93,7 +111,7 @@ def affect_from_json(message: Mapping[str, Any]) -> Affect:
     if seat is not None and (not isinstance(seat, int) or isinstance(seat, bool) or seat < 0):
         raise WireError(f"`seat` is {seat!r}: it must be the number of a seat, from 0")
     taken_at = message.get("taken_at")
-    if taken_at is not None and not _is_number(taken_at):
+    if taken_at is not None and not (_is_number(taken_at) and 0 <= taken_at <= LAST_SECOND):
         raise WireError(f"`taken_at` is {taken_at!r}: it must be seconds since the Unix epoch")
     return Affect(
         label=_text(message, "label"),
@@ -124,7 +142,8 @@ def _number(message: Mapping[str, Any], name: str, least: float) -> float | None
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    # Not `math.isfinite`, which cannot take an integer of hundreds of digits.
+    return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
 
 
 def _with_integers(fields: dict[str, Any], descriptor: Descriptor) -> None:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from chefshat import pb
@@ -111,9 +112,7 @@ class JsonLinesDriver(Driver):
     def _receive(self, line: bytes) -> None:
         """Processes a line. A bad one is logged and ignored."""
         try:
-            message = json.loads(line)
-            if not isinstance(message, dict):
-                raise wire.WireError("a line must be a JSON object")
+            message = wire.parse(line)
             match message.get("type"):
                 case "done":
                     self._settle(message, Done())
@@ -124,6 +123,6 @@ class JsonLinesDriver(Driver):
         except ValueError as error:
             LOG.warning("ignored a line of the robot: %s", error)
 
-    def _settle(self, message: dict[str, Any], outcome: Outcome) -> None:
+    def _settle(self, message: Mapping[str, Any], outcome: Outcome) -> None:
         if not self._replies.settle(str(message.get("id")), outcome):
             LOG.info("the robot answered act %r, which nobody waits for", message.get("id"))
