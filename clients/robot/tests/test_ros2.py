@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from chefshat_robot.drivers import ros2
 from chefshat_robot.drivers.cdr import FOLDER, Cdr
 from chefshat_robot.drivers.driver import (
     Affect,
@@ -65,6 +66,7 @@ class RosRobot:
         self.cancelled: list[list[int]] = []
         self.heard: list[tuple[str, dict[str, Any]]] = []
         self.accepts = True
+        self.hesitates = False
         self.greeted = False
         self._results: list[tuple[Any, dict[str, Any]]] = []
         self._lock = threading.Lock()
@@ -87,6 +89,9 @@ class RosRobot:
             self.greeted = True
         else:
             self.goals.append(goal)
+        if self.hesitates and not greets:
+            self._results.append((query, goal))
+            return
         reply = {"accepted": self.accepts and not greets, "stamp": {"sec": 1, "nanosec": 2}}
         query.reply(query.key_expr, self.cdr.encode("PlayTurn_SendGoal_Response", reply))
         query.drop()
@@ -188,6 +193,18 @@ def test_the_robot_can_fail_refuse_hang_and_leave() -> None:
             outcome = await performing
             assert isinstance(outcome, Failed)
             assert "no robot answers at chefshat/play_turn/_action/get_result" in outcome.reason
+
+    run(test())
+
+
+def test_an_act_that_is_not_accepted_in_time_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test() -> None:
+        async with pair() as (driver, robot):
+            monkeypatch.setattr(ros2, "ACCEPT_S", 0.3)
+            robot.hesitates = True
+            outcome = await attempt(driver, Say("one"), FAR_S)
+            assert isinstance(outcome, Failed)
+            await until(lambda: robot.goals and robot.cancelled == [robot.goals[0]["goal_id"]["uuid"]])
 
     run(test())
 

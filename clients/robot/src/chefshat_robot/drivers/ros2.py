@@ -18,6 +18,7 @@ An act that takes too long is cancelled as an action.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import uuid
 from typing import Any
@@ -84,7 +85,13 @@ class Ros2Driver(Driver):
         self._goal = uuid.uuid4().bytes
         goal_id = {"uuid": list(self._goal)}
         request = {"goal_id": goal_id, "goal": {"acts": [ros_messages.act_message(act)]}}
-        reply = await self._call("play_turn/_action/send_goal", "PlayTurn_SendGoal", request, ACCEPT_S)
+        try:
+            reply = await self._call("play_turn/_action/send_goal", "PlayTurn_SendGoal", request, ACCEPT_S)
+        except RobotError:
+            # The robot may only be slow, and would do later what people are asked for now.
+            with contextlib.suppress(RobotError):
+                await self.stop()
+            raise
         if not reply["accepted"]:
             return Failed("the robot refused the goal")
         answer = await self._call("play_turn/_action/get_result", "PlayTurn_GetResult", {"goal_id": goal_id}, RESULT_S)
