@@ -9,10 +9,25 @@ from typing import Any
 
 import chefshat
 import pytest
-from chefshat import Decision, SeatInfo, pb
+from chefshat import ChefsHatError, Decision, SeatInfo, pb
 
 from chefshat_robot.body import PASS, Body, Notice, Times, Turn
-from chefshat_robot.drivers.driver import Act, CardMove, Done, Express, Failed, Gaze, Outcome, Pick, Point, Pose, RobotError, Say
+from chefshat_robot.drivers.driver import (
+    Act,
+    Button,
+    CardMove,
+    Done,
+    Express,
+    Failed,
+    Gaze,
+    Outcome,
+    Pick,
+    Point,
+    Pose,
+    RobotError,
+    RobotEvent,
+    Say,
+)
 from chefshat_robot.player import RobotPlayer, limit_s, turn_of
 from chefshat_robot.words import Words
 from tests.loop import run, until
@@ -609,3 +624,24 @@ def test_a_turn_is_not_delayed_by_reactions_that_wait() -> None:
         await body.__aexit__(None, None, None)
 
     run(test())
+
+
+def test_an_agent_that_fails_at_what_the_robot_perceives_perceives_further(caplog: pytest.LogCaptureFixture) -> None:
+    heard: list[RobotEvent] = []
+
+    def fail(event: RobotEvent) -> None:
+        heard.append(event)
+        raise KeyError("no idea")
+
+    async def test() -> None:
+        robot = ScriptedRobot()
+        async with Body(robot, Words("en")) as body:
+            player = RobotPlayer(Takes(199), body, on_robot_event=fail)
+            player.on_attached(SeatInfo("room", "game", 1))
+            for name in ("chest", "head"):
+                robot.report(Button(name))
+            await until(lambda: len(heard) == 2)
+            player.on_seat_lost(ChefsHatError("SUPERSEDED", "a newer connection has taken the seat"))
+
+    run(test())
+    assert caplog.text.count("KeyError: 'no idea'") == 2

@@ -20,7 +20,7 @@ import chefshat
 from chefshat import ChefsHatError, Decision, SeatInfo, SeatResult, pb
 
 from chefshat_robot.body import PASS, Body, Turn
-from chefshat_robot.drivers.driver import RobotEvent
+from chefshat_robot.drivers.driver import LOG, RobotEvent
 
 # The part of a decision's time that is left for the answer to travel, and the least of it, in seconds.
 MARGIN = 0.15
@@ -157,7 +157,10 @@ class RobotPlayer(chefshat.Agent):
 
     async def _listen(self) -> None:
         async for event in self._body.driver.events():
-            self._on_robot_event(event)
+            try:
+                self._on_robot_event(event)
+            except Exception:
+                LOG.exception("the agent failed at %s", event)
 
     def _end(self) -> None:
         if self._listener is not None:
