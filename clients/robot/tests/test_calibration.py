@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -83,3 +85,16 @@ def test_what_is_not_a_camera_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.json").write_text('{"width": 3}')
     with pytest.raises(ValueError, match="not a camera's calibration"):
         Camera.load(tmp_path / "notes.json")
+
+
+def test_a_calibration_is_replaced_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    file = tmp_path / "camera.json"
+    CAMERA.save(file)
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        CAMERA.scaled(1280, 720).save(file)
+    assert Camera.load(file).width == CAMERA.width
+    assert list(tmp_path.iterdir()) == [file]

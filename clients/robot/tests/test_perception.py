@@ -425,6 +425,16 @@ def test_a_full_disk_ends_the_recording_and_not_what_it_records(
     assert (tmp_path / "events.jsonl").read_text() == "", "nothing follows"
 
 
+def test_a_recording_ends_before_a_line_that_was_not_written_to_its_end(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    table = SyntheticTable([LayCards(0.6, 1, (Card(0, 40),), (1,))], EASY, seed=9)
+    with Recorder(tmp_path) as recorder:
+        events = happened(watch(table, Perception(table.camera, recorder=recorder)))
+    with (tmp_path / "sightings.jsonl").open("a") as file:
+        file.write('{"frame":')
+    assert happened(list(replay(tmp_path))) == events
+    assert "was not written to its end" in caplog.text
+
+
 def test_a_damaged_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "sightings.jsonl").write_text('{"recording":1,"deck":null}\n{"frame":0}\n')
     with pytest.raises(ValueError, match="line 2"):
@@ -553,6 +563,23 @@ def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pyt
     truth = [json.loads(line) for line in (evening / "events.jsonl").read_text().splitlines()]
     assert events
     assert [event[0] for event in events] == [true_event["kind"] for true_event in truth][: len(events)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["bridge", "{}", "--ticket", "T", "--camera", "{}/none.json"], "none.json: give a camera's calibration"),
+        (["bridge", "{}", "--ticket", "T", "--record", "{}/0.png"], "0.png"),
+        (["perceive", "{}", "--camera", "{}/none.json"], "none.json: give a camera's calibration"),
+        (["perceive", "--replay", "{}"], "sightings.jsonl: give a recording"),
+    ],
+)
+def test_files_that_cannot_be_read_or_written_are_named(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), np.zeros((8, 8, 3), np.uint8))
+    assert cli.main([word.format(tmp_path) for word in arguments]) == 1
+    assert message in capsys.readouterr().err
 
 
 def test_the_command_says_that_it_never_found_the_field(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

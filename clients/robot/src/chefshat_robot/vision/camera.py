@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from chefshat.files import check_readable, write_atomically
 from numpy.typing import NDArray
 
 
@@ -72,7 +73,7 @@ class Camera:
         return Camera(width, height, matrix, self.distortion, self.error * factor)
 
     def save(self, path: Path) -> None:
-        """Writes the camera to a JSON file."""
+        """Writes the camera to a JSON file atomically. Raises OSError if it cannot be written."""
         values = {
             "width": self.width,
             "height": self.height,
@@ -80,7 +81,7 @@ class Camera:
             "distortion": self.distortion.tolist(),
             "error": self.error,
         }
-        path.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+        write_atomically(path, json.dumps(values, indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> Camera:
@@ -90,6 +91,7 @@ class Camera:
             OSError: The file cannot be read.
             ValueError: It is not the file of a camera.
         """
+        check_readable(path, "camera's calibration", "`chefshat-robot calibrate` writes")
         try:
             values = json.loads(path.read_text(encoding="utf-8"))
             matrix = np.asarray(values["matrix"], dtype=np.float64)

@@ -85,8 +85,6 @@ def run(arguments: argparse.Namespace) -> int:
                 is_found = _print_all(
                     _watch(Perception(camera, arguments.deck, recorder), frames), arguments.json, arguments.doubts
                 )
-    except FileNotFoundError as error:
-        raise CommandError(f"{error.filename} does not exist; give a folder that --record has written") from error
     except FileExistsError as error:
         raise CommandError(f"{error.filename} exists; give a folder without a recording") from error
     except (OSError, SourceError, ValueError) as error:

@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 import cv2
+from chefshat.files import check_readable
 
 from chefshat_robot.deck import Card
 
@@ -99,16 +100,20 @@ class Recorder:
 
 
 def replay(folder: Path) -> Iterator[Observed]:
-    """The events of a recording, decided again from its sightings and answers.
+    """The events of a recording, decided again from its sightings and answers; without a last line that was not written to its end.
 
     Raises:
         OSError: The recording cannot be read.
         ValueError: A line of it is not one of a recording, or of another version; the message names it.
     """
     path = folder / "sightings.jsonl"
+    check_readable(path, "recording", "`--record` writes")
     decider: Decider | None = None
     with path.open(encoding="utf-8") as lines:
         for number, line in enumerate(lines, start=1):
+            if not line.endswith("\n"):
+                LOG.warning("the last line of %s is left out: it was not written to its end", path)
+                return
             try:
                 values: dict[str, Any] = json.loads(line)
                 if decider is None:
