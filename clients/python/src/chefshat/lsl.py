@@ -151,7 +151,7 @@ class MarkerStream:
 
 
 def code_of(event: pb.GameEvent) -> str:
-    """The kind of an event in a word, as event.proto names it, and its seat if it has one: "play 2", "pizza_ended"."""
+    """The kind of an event in a word, as event.proto names it, and its seat if it has one: "play 2", "pizza_done"."""
     kind = event.WhichOneof("kind")
     if kind is None:
         return "unknown"
