@@ -256,10 +256,10 @@ def test_the_actions_are_those_of_the_server(real_address: str) -> None:
     ("options", "outcome"),
     [
         (["--agent", "no colon"], "not of the form module.path:Class"),
-        (["--arguments", "[1]"], "must be an object"),
+        (["--arguments", "[1]"], "must be a JSON object"),
         (["--arguments", "{"], "not JSON"),
         (["--limit", "0"], "must be above 0"),
-        (["--attempts", "-1"], "must be 0 or more"),
+        (["--attempts", "-1"], "must be a number from 0"),
     ],
 )
 def test_arguments_are_checked(options: list[str], outcome: str, capsys: pytest.CaptureFixture[str]) -> None:

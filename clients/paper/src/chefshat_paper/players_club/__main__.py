@@ -9,11 +9,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from chefshat import Client, join_options, outcome
 from chefshat.errors import exit_code
 from chefshat.join_options import JoinOptions
+from chefshat.learn.command import above_zero, json_object, natural
 
 from chefshat_paper.players_club.agent import ATTEMPTS, RulesDoNotFit, check_rules
 from chefshat_paper.players_club.players import Players
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     spec = AgentSpec(
         agent=options.agent,
         name=options.name or options.agent.rpartition(":")[2],
-        arguments=options.arguments,
+        arguments=json.loads(options.arguments),
         python=options.python,
         paths=tuple(options.path),
         start_limit_s=options.start_limit,
@@ -104,21 +104,25 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--name", help="display name, also passed to the player (default: the player's own name)")
     parser.add_argument(
-        "--arguments", type=json_object, default={}, metavar="JSON", help="arguments of its constructor, as an object"
+        "--arguments", type=json_object, default="{}", metavar="JSON", help="arguments of its constructor, as an object"
     )
     parser.add_argument(
         "--attempts",
-        type=count,
+        type=natural,
         default=ATTEMPTS,
         help="illegal choices sent for one decision before the best legal one is taken (default: %(default)s, as in the reference)",
     )
     parser.add_argument(
-        "--limit", type=seconds, default=60.0, metavar="S", help="time limit of a call, in seconds (default: %(default)s)"
+        "--limit", type=above_zero, default=60.0, metavar="S", help="time limit of a call, in seconds (default: %(default)s)"
     )
     parser.add_argument(
-        "--start-limit", type=seconds, default=120.0, metavar="S", help="time limit of starting, in seconds (default: %(default)s)"
+        "--start-limit",
+        type=above_zero,
+        default=120.0,
+        metavar="S",
+        help="time limit of starting, in seconds (default: %(default)s)",
     )
-    parser.add_argument("--restarts", type=count, default=3, help="maximum restarts of a process (default: %(default)s)")
+    parser.add_argument("--restarts", type=natural, default=3, help="maximum restarts of a process (default: %(default)s)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="a file to append the player's output to")
     parser.add_argument("--json", action="store_true", help="print one line of JSON for each game or tournament instead of a table")
     options = parser.parse_args(arguments)
@@ -132,33 +136,6 @@ def class_name(text: str) -> str:
     if not (module and name.isidentifier()):
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form module.path:Class")
     return text
-
-
-def json_object(text: str) -> dict[str, Any]:
-    """Parses a JSON object."""
-    try:
-        read = json.loads(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"not JSON: {error}") from error
-    if not isinstance(read, dict):
-        raise argparse.ArgumentTypeError('must be an object, for example {"verbose_console": false}')
-    return read
-
-
-def seconds(text: str) -> float:
-    """Parses a number of seconds above 0."""
-    value = float(text)
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("must be above 0")
-    return value
-
-
-def count(text: str) -> int:
-    """Parses a number from 0."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError("must be 0 or more")
-    return value
 
 
 if __name__ == "__main__":
