@@ -2,7 +2,6 @@
 
 import json
 import re
-import struct
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chefshat.errors import INTERRUPTED
-from chefshat.learn.figures import Figure, Level, Line, Panel, Points
+from chefshat.learn.figures import Line
+from drawing import a_figure, png_size
 
 from chefshat_paper.experiments import Estimate, Result, Table, paper, results, stats
 from chefshat_paper.experiments.__main__ import main, parse
@@ -32,12 +32,6 @@ def a_result(experiment: str = "mechanics", *, quick: bool = False) -> Result:
         ["all", Estimate(0.28, percent=True, digits=0), stats.share(70, 250)],
         ["none", None, Estimate(-0.82, -0.9, 0.1, digits=2)],
     ]
-    lines = [Line("learner", [1, 2], [0.123456789, 2.0], [0.0, 1.0], [1.0, 3.0])]
-    points = [Points("ours", [1.0, float("nan")], [0.5, float("nan")], [1.5, float("nan")])]
-    panels = [
-        Panel("Over time", "Shift", "reward", lines=lines, levels=[Level("paper", 0.5)], y_range=(-1, 3)),
-        Panel("By condition", "", "laps", points=points, categories=["all", "none"]),
-    ]
     return Result(
         experiment=experiment,
         title="Experiment 1",
@@ -46,16 +40,9 @@ def a_result(experiment: str = "mechanics", *, quick: bool = False) -> Result:
         settings={"games": 250},
         rules={"all": {"preset": "paper"}},
         tables=[Table("starter", "Who wins | who loses", ["agents", "paper", "ours"], rows, note="In brackets intervals.")],
-        figures=[Figure("curves", "All of it", panels)],
+        figures=[a_figure()],
         run={"command": "python", "seconds": 1.5, "package_version": "0", "server_version": "0", "python": "3"},
     )
-
-
-def png_size(picture: bytes) -> tuple[int, int]:
-    assert picture[:8] == b"\x89PNG\r\n\x1a\n"
-    assert picture[12:16] == b"IHDR"
-    width, height = struct.unpack(">II", picture[16:24])
-    return width, height
 
 
 # From Newcombe (1998), table I, to four digits.
