@@ -1,6 +1,7 @@
 """Both clients over real connections to the fake server: whole games, broken streams, refused seats, agents that fail."""
 
 import asyncio
+import math
 import threading
 from collections.abc import Callable, Mapping
 
@@ -9,7 +10,7 @@ from fake_game import QUESTIONS, FakeGame, FakeSeat
 from fake_server import FakeServer
 
 import chefshat
-from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, pb
+from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, backoff, pb
 
 QUICK = Backoff(first_s=0.001, max_s=0.01)
 Results = dict[str, SeatResult]
@@ -130,7 +131,8 @@ def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str
         assert wanted[-1] > 4 * QUESTIONS - 4
 
 
-def test_connections_without_progress_are_given_up(fake: FakeServer, play: Player) -> None:
+def test_connections_without_progress_are_given_up(fake: FakeServer, play: Player, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backoff, "STABLE_S", math.inf)
     fake.fault = lambda game, seat, answer: "before"
     (ticket,) = seats(fake, played=1)
     result = play(fake.address, {ticket: Listener()})[ticket]
@@ -138,6 +140,14 @@ def test_connections_without_progress_are_given_up(fake: FakeServer, play: Playe
     assert result.error.reason == "UNAVAILABLE"
     # The first stream had the start of the game, which is progress; the ten allowed attempts after it had none.
     assert fake.streams == 1 + QUICK.attempts
+
+
+def test_connections_that_last_are_never_given_up(fake: FakeServer, play: Player, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backoff, "STABLE_S", 0.0)
+    fake.fault = lambda game, seat, answer: "before" if fake.streams < 2 * QUICK.attempts else ""
+    (ticket,) = seats(fake, played=1)
+    assert play(fake.address, {ticket: Listener()})[ticket].finished
+    assert fake.streams == 2 * QUICK.attempts
 
 
 class Talkative(Listener):

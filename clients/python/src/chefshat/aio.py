@@ -5,10 +5,12 @@ protocol of playing is in `session`.
 """
 
 import asyncio
+import math
+import time
 from collections.abc import Awaitable
 from typing import TypeAlias
 
-from chefshat import pb
+from chefshat import backoff, pb
 from chefshat._async.calls import AsyncCalls
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
@@ -77,9 +79,11 @@ class _Run:
         session = self._session
         session.connected()
         self._call = call
+        opened = math.inf
         try:
             with closed_is_an_error():
                 await _opened(call)
+                opened = time.monotonic()
                 await self._flush(call)
                 while not session.done:
                     response = await call.read()
@@ -94,6 +98,8 @@ class _Run:
         except asyncio.InvalidStateError:
             return connection_lost()  # The call ended before a write.
         finally:
+            if time.monotonic() - opened >= backoff.STABLE_S:
+                session.progress += 1
             self._call = None
             call.cancel()
         return connection_lost()

@@ -3,6 +3,10 @@
 import random
 from dataclasses import dataclass
 
+# Seconds after which a lost connection counts as the first failure again: it may have lasted while nothing happened, for instance
+# before a tournament begins. The Rust SDK counts in the same way.
+STABLE_S = 5.0
+
 
 @dataclass(frozen=True)
 class Backoff:

@@ -3,6 +3,7 @@
 The protocol of playing is in `session`.
 """
 
+import math
 import threading
 import time
 from collections import deque
@@ -10,7 +11,7 @@ from collections.abc import Awaitable, Coroutine, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
-from chefshat import pb
+from chefshat import backoff, pb
 from chefshat._sync.calls import Calls
 from chefshat.address import ServerAddress
 from chefshat.agents import Agent
@@ -69,6 +70,8 @@ class Client(Calls):
         with pump.busy:
             pump.closed = True
             session.lost(pump.asks)
+        if time.monotonic() - pump.opened >= backoff.STABLE_S:
+            session.progress += 1
         failure = pump.failure
         if failure is not None and not isinstance(failure, grpc.RpcError):
             call.cancel()
@@ -98,6 +101,8 @@ class _Pump(Iterator[pb.PlayRequest]):
         self.stopped = threading.Event()
         #: Ends the iterator; set under `busy`.
         self.closed = False
+        #: When the first response arrived.
+        self.opened = math.inf
         #: The exception of the call or of an agent.
         self.failure: BaseException | None = None
         self._session = session
@@ -131,6 +136,7 @@ class _Pump(Iterator[pb.PlayRequest]):
                 response = next(self.call, None)
                 if response is None:
                     return None
+                self.opened = min(self.opened, time.monotonic())
                 self.asks.extend(session.receive(response))
                 if self.asks:
                     self._decide()

@@ -73,7 +73,7 @@ class PlaySession:
         self._participant: Participant | None = None
         self._by_handle: dict[int, SeatSession] = {}
         self._outbox: list[pb.SeatCommand] = []
-        #: Grows with every event and answer of a seat. A connection without progress counts as failed.
+        #: Grows with every event and answer of a seat, and with a connection that lasts. One without progress counts as failed.
         self.progress = 0
         for ticket, agent in agents.items():
             self._add(ticket, agent, self._options.draw_entropy())
