@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from waiting import LIMIT_S
 
-from chefshat import pb
+from chefshat import ChefsHatError, pb
 from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo_checkpoint import Plan
@@ -117,6 +117,20 @@ def test_a_random_policy_has_the_mean_of_the_points(sample: ModuleType, anywhere
     assert sum(found.places) == found.shifts
     # A Shift has 5, 3, 1 and 0 points.
     assert abs(found.points - 9 / 4) < 4 * found.standard_error < 1
+
+
+def test_a_training_that_ends_with_an_error_writes_what_it_has_learned(
+    sample: ModuleType, anywhere: str | None, tmp_path: Path
+) -> None:
+    def lost() -> None:
+        raise ChefsHatError("CONNECTION_LOST", "the server is gone")
+
+    training = ppo_checkpoint.begin(Plan(), 1, runs.full_rules("paper", anywhere), "")
+    algorithm = SimpleNamespace(train=lost, network=training.network)
+    out = tmp_path / "network.safetensors"
+    with pytest.raises(ChefsHatError, match="CONNECTION_LOST"):
+        list(sample.trained(algorithm, SimpleNamespace(iterations=3, out=out)))
+    assert network.load(out).info.name == "rllib"
 
 
 @pytest.mark.server

@@ -246,20 +246,23 @@ def trained(algorithm: JaxPPO, options: argparse.Namespace) -> Iterator[dict[str
     Beside what was learned, a policy that draws legal actions and the network before training play the same deals.
     """
     untrained = algorithm.network("untrained")
-    for iteration in range(1, options.iterations + 1):
-        result = algorithm.train()
-        yield {
-            "event": "iteration",
-            "iteration": iteration,
-            "decisions": int(result["decisions"]),
-            "runners": int(result["runners"]),
-            "playing_s": round(result["playing_s"], 3),
-            "learning_s": round(result["learning_s"], 3),
-            "entropy": round(result["losses"]["entropy"], 4),
-        }
-    learned = algorithm.network("rllib")
-    if options.out:
-        network.save(options.out, learned.layers, learned.info, dtype=np.float16)
+    try:
+        for iteration in range(1, options.iterations + 1):
+            result = algorithm.train()
+            yield {
+                "event": "iteration",
+                "iteration": iteration,
+                "decisions": int(result["decisions"]),
+                "runners": int(result["runners"]),
+                "playing_s": round(result["playing_s"], 3),
+                "learning_s": round(result["learning_s"], 3),
+                "entropy": round(result["losses"]["entropy"], 4),
+            }
+    finally:
+        # Also if a server was lost, or Ctrl-C has ended the training.
+        learned = algorithm.network("rllib")
+        if options.out:
+            network.save(options.out, learned.layers, learned.info, dtype=np.float16)
     for opponents in OPPONENTS:
         alike: dict[str, Any] = {
             "games": options.evaluation,
