@@ -223,20 +223,6 @@ class Stalling(Largest):
         return super().get_action(observations)
 
 
-class Answering(Largest):
-    """Answers with its constructor's argument."""
-
-    def __init__(self, name: str, answer: object) -> None:
-        super().__init__(name)
-        self.answer = answer
-
-    def get_action(self, observations: Any) -> Any:
-        return self.answer
-
-    def get_exhanged_cards(self, cards: list[int], amount: int) -> Any:
-        return self.answer
-
-
 class Unspeakable(Largest):
     """Answers with an object that is not a number."""
 

@@ -4,9 +4,6 @@ from pathlib import Path
 
 from chefshat.local_server import LocalServer
 
-# Time limit for starting, seconds.
-START_S = 60.0
-
 
 class RealServer(LocalServer):
     """`chefshat serve` on a free port, with a separate data directory; a context manager.

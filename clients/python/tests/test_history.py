@@ -7,8 +7,6 @@ import pytest
 
 from chefshat import VectorEnv, history, pb
 
-PASS = 199
-
 
 @pytest.fixture
 def env(anywhere: str | None) -> Iterator[VectorEnv]:
