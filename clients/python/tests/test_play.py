@@ -194,7 +194,7 @@ class Broken(Agent):
     """Raises."""
 
     def decide(self, request: Decision) -> int:
-        raise ZeroDivisionError("an agent's own mistake")
+        raise ZeroDivisionError("an agent's own mistake") from KeyError("what led to it")
 
 
 class BrokenLater(Broken):
@@ -207,14 +207,16 @@ class BrokenLater(Broken):
 
 def test_exceptions_of_agents_propagate(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
-    with pytest.raises(ZeroDivisionError, match="own mistake"):
+    with pytest.raises(ZeroDivisionError, match="own mistake") as raised:
         play(fake.address, {ticket: Broken()})
+    assert isinstance(raised.value.__cause__, KeyError)
 
 
 def test_exceptions_of_coroutines_propagate(fake: FakeServer) -> None:
     (ticket,) = seats(fake, played=1)
-    with pytest.raises(ZeroDivisionError, match="own mistake"):
+    with pytest.raises(ZeroDivisionError, match="own mistake") as raised:
         play_asyncio(fake.address, {ticket: BrokenLater()})
+    assert isinstance(raised.value.__cause__, KeyError)
 
 
 class Offline(aio.Client):

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from chefshat import backoff, pb
 from chefshat._async.calls import AsyncCalls
-from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.errors import ChefsHatError, connection_lost, first_error, from_rpc_error
 from chefshat.network import grpc
 from chefshat.requests import closed_is_an_error
 from chefshat.seat_session import Ask
@@ -36,7 +36,7 @@ class Client(AsyncCalls):
     async def _play_session(self, session: PlaySession) -> None:
         """Plays until the session is done, reconnecting as needed."""
         failures = 0
-        try:
+        with first_error():
             # An agent that fails ends the session at any time, also between connections.
             async with asyncio.TaskGroup() as group:
                 run = _Run(session, group)
@@ -52,8 +52,6 @@ class Client(AsyncCalls):
                     except ChefsHatError as final:
                         session.give_up(final)
                 run.end()
-        except BaseExceptionGroup as failed:
-            raise failed.exceptions[0] from None
 
 
 class _Run:

@@ -17,6 +17,7 @@ from contextlib import suppress
 
 from chefshat.agents import Agent
 from chefshat.aio import Client
+from chefshat.errors import first_error
 
 
 def play(make_agent: Callable[[], Agent], *, games: Iterable[str] | None = None) -> int:
@@ -61,17 +62,16 @@ async def _play(make_agent: Callable[[], Agent], games: Iterable[str]) -> int:
     clients: dict[str, Client] = {}
     played = 0
     try:
-        async with asyncio.TaskGroup() as group:
-            while (line := await lines.get()) is not None:
-                if isinstance(line, Exception):
-                    raise line
-                address, code, name = _game(line)
-                if address not in clients:
-                    clients[address] = Client(address)
-                group.create_task(_play_one(clients[address], make_agent(), code, name))
-                played += 1
-    except BaseExceptionGroup as failed:
-        raise failed.exceptions[0] from None
+        with first_error():
+            async with asyncio.TaskGroup() as group:
+                while (line := await lines.get()) is not None:
+                    if isinstance(line, Exception):
+                        raise line
+                    address, code, name = _game(line)
+                    if address not in clients:
+                        clients[address] = Client(address)
+                    group.create_task(_play_one(clients[address], make_agent(), code, name))
+                    played += 1
     finally:
         for client in clients.values():
             await client.close()

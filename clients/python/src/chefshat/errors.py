@@ -6,7 +6,8 @@ errors or codes is at hand, since environments in this process work without it.
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from chefshat import pb
@@ -123,6 +124,16 @@ def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[
             if detail.Is(info.DESCRIPTOR) and detail.Unpack(info):
                 return info.reason, dict(info.metadata)
     return "", {}
+
+
+@contextmanager
+def first_error() -> Iterator[None]:
+    """Raises the first error of a task group alone, with the cause that it has: it may be an agent's."""
+    try:
+        yield
+    except BaseExceptionGroup as failed:
+        error = failed.exceptions[0]
+        raise error from error.__cause__
 
 
 def exit_code(command: Callable[[], int], *refusals: type[Exception], as_json: bool) -> int:

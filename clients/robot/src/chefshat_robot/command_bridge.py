@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from chefshat import aio, pb
+from chefshat.errors import first_error
 from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot.bridge import Bridge
@@ -77,14 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
                     perception = Perception(camera, arguments.deck, recorder)
                     bridge = Bridge(client.tables, arguments.ticket, perception, on_report=report_printer(arguments.json))
                     readers = [(seat, HandReader(deck=arguments.deck), source) for seat, source in hands]
-                    try:
+                    with first_error():
                         async with asyncio.TaskGroup() as group:
                             watched = [group.create_task(bridge.watch_hand(*reader)) for reader in readers]
                             await bridge.run(frames)
                             for task in watched:
                                 task.cancel()
-                    except BaseExceptionGroup as failed:
-                        raise failed.exceptions[0] from None
                     return 0
 
             return run_command(watch)

@@ -21,7 +21,7 @@ from chefshat import local_server, pb
 from chefshat.address import CA, TOKEN, ServerAddress, server_address
 from chefshat.agents import Agent
 from chefshat.aio import Client
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, first_error
 from chefshat.local_server import LocalServer
 from chefshat.result import abort_reason_of
 from chefshat.vector import LOCAL
@@ -432,11 +432,7 @@ class _Process:
 
 async def _together(coroutines: Sequence[Coroutine[Any, Any, Any]]) -> list[Any]:
     """Runs coroutines and returns their results. Ends all with the first error, which it raises."""
-    try:
+    with first_error():
         async with asyncio.TaskGroup() as group:
             tasks = [group.create_task(coroutine) for coroutine in coroutines]
-    except BaseExceptionGroup as failed:
-        error = failed.exceptions[0]
-        # Whatever it has as its cause stays: the traceback of an agent.
-        raise error from error.__cause__
     return [task.result() for task in tasks]
