@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
             ):
                 begun = trainer.training
                 training_log.log_setup("ppo", dataclasses.asdict(begun.plan), begun.seed, begun.rules, begun.trained_by)
-                with Scalars(options.tensorboard) as scalars:
+                with Scalars(options.tensorboard, begun.progress.decisions) as scalars:
                     evaluations = _train(trainer, options, state, scalars, evaluated)
                 is_stopped = _share_done(options, trainer.training.progress) < 1
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:

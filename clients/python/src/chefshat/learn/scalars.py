@@ -9,13 +9,18 @@ from typing import Self
 class Scalars:
     """Writes numbers to a folder for TensorBoard; a context manager. Without a folder it writes nothing."""
 
-    def __init__(self, folder: Path | None) -> None:
-        """Opens the folder, which is created."""
+    def __init__(self, folder: Path | None, decisions: int = 0) -> None:
+        """Opens the folder, which is created.
+
+        Args:
+            folder: the folder.
+            decisions: those of a training that is resumed. What was written after them is played again, and not shown.
+        """
         self._writer = None
         if folder is not None:
             from tensorboardX import SummaryWriter
 
-            self._writer = SummaryWriter(str(folder))
+            self._writer = SummaryWriter(str(folder), purge_step=decisions + 1 if decisions else None)
 
     def __enter__(self) -> Self:
         return self
