@@ -42,6 +42,7 @@ from chefshat_robot.synthetic import (
     random_shift,
 )
 from chefshat_robot.vision import (
+    Camera,
     Cleared,
     Doubt,
     DoubtResolved,
@@ -580,6 +581,17 @@ def test_files_that_cannot_be_read_or_written_are_named(
     cv2.imwrite(str(tmp_path / "0.png"), np.zeros((8, 8, 3), np.uint8))
     assert cli.main([word.format(tmp_path) for word in arguments]) == 1
     assert message in capsys.readouterr().err
+
+
+def test_a_full_disk_ends_a_command_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(camera: Camera, path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Camera, "save", full)
+    assert cli.main(["table", str(tmp_path / "evening"), "--seconds", "1"]) == 1
+    assert capsys.readouterr().err == "chefshat-robot: [Errno 28] No space left on device\n"
 
 
 def test_the_command_says_that_it_never_found_the_field(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

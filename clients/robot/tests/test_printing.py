@@ -250,7 +250,7 @@ def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsy
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["print", "--only", "roles", "--out", str(tmp_path / "no" / "roles.pdf")]) == 1
-    assert f"cannot write {tmp_path / 'no' / 'roles.pdf'}: No such file or directory" in capsys.readouterr().err
+    assert f"No such file or directory: '{tmp_path / 'no' / 'roles.pdf'}'" in capsys.readouterr().err
 
 
 def test_the_commands_of_the_book_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,6 +29,7 @@ class Command(Protocol):
 
         Raises:
             CommandError: With a message for the user.
+            OSError: A file cannot be read or written.
         """
 
 
@@ -85,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parsed = parser.parse_args(given)
         assert command is not None, "a chosen command is one of COMMANDS"
         return command.run(parsed)
-    except CommandError as error:
+    except (CommandError, OSError) as error:
         print(f"chefshat-robot: {error}", file=sys.stderr)
         return 1
 

@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from chefshat_robot.cli import CommandError
 from chefshat_robot.deck import DECKS
 from chefshat_robot.printing import sheets, surfaces
 from chefshat_robot.printing.canvas import PAPERS, Canvas, Paper
@@ -73,10 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Writes the PDF and says what to do with it."""
     canvas = print_game(PAPERS[arguments.paper], arguments.deck, arguments.only, backs=arguments.backs)
-    try:
-        canvas.save(arguments.out)
-    except OSError as error:
-        raise CommandError(f"cannot write {arguments.out}: {error.strerror}") from error
+    canvas.save(arguments.out)
     print(f"{arguments.out}: {canvas.pages} pages. Print at 100 % (actual size) and check the ruler: 100 mm.")
     return 0
 

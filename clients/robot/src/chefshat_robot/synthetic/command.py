@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         (arguments.output / "frames" if arguments.pictures else arguments.output).mkdir(parents=True)
     except FileExistsError as error:
         raise CommandError(f"{arguments.output} exists; give a new folder") from error
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise CommandError(str(error)) from error
     size = (arguments.height * 16 // 9, arguments.height)
     acts = acts_of_steps(steps, arguments.seed, difficulty.pause, difficulty.hovers)

@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
                 )
     except FileExistsError as error:
         raise CommandError(f"{error.filename} exists; give a folder without a recording") from error
-    except (OSError, SourceError, ValueError) as error:
+    except (SourceError, ValueError) as error:
         raise CommandError(str(error)) from error
     except KeyboardInterrupt:
         print(file=sys.stderr)
