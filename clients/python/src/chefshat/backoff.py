@@ -16,8 +16,9 @@ class Backoff:
         first_s: seconds before the first new attempt.
         factor: factor from one delay to the next.
         max_s: maximum delay in seconds.
-        attempts: maximum number of consecutive failures without progress; a further one is raised. The default waits for about ten
-            minutes: a server may be down for a while, and its games resume when it is back.
+        attempts: maximum number of consecutive failures without progress, or a connection that lasts for `STABLE_S`; a further one
+            is raised. The default waits for about ten minutes: a server may be down for a while, and its games resume when it is
+            back.
     """
 
     first_s: float = 0.1
