@@ -645,3 +645,26 @@ def test_an_agent_that_fails_at_what_the_robot_perceives_perceives_further(caplo
 
     run(test())
     assert caplog.text.count("KeyError: 'no idea'") == 2
+
+
+def test_a_robot_that_is_interrupted_at_the_end_is_given_back() -> None:
+    class Returned(ScriptedRobot):
+        closed = False
+
+        async def close(self) -> None:
+            self.closed = True
+
+    async def use(robot: ScriptedRobot) -> None:
+        async with Body(robot, Words("en")) as body:
+            body.say("One moment.", "en")
+
+    async def test() -> None:
+        robot = Returned(lambda act: None)
+        using = asyncio.create_task(use(robot))
+        await until(lambda: robot.acts)
+        using.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await using
+        assert robot.closed
+
+    run(test())

@@ -208,18 +208,19 @@ class Body:
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if error is None:
-            try:
+        try:
+            if error is None:
                 async with asyncio.timeout(self._finish_s):
-                    await self._idle.wait()
-                    await self._all_forwarded.wait()
-            except TimeoutError:
-                LOG.warning("the robot did not finish its last acts within %g s", self._finish_s)
-        for task in (self._worker, self._forwarder):
-            if task is not None:
-                task.cancel()
-                await asyncio.gather(task, return_exceptions=True)
-        await self.driver.__aexit__(kind, error, trace)
+                    await self.idle()
+        except TimeoutError:
+            LOG.warning("the robot did not finish its last acts within %g s", self._finish_s)
+        finally:
+            # Also after Ctrl-C while it finished them.
+            for task in (self._worker, self._forwarder):
+                if task is not None:
+                    task.cancel()
+                    await asyncio.gather(task, return_exceptions=True)
+            await self.driver.__aexit__(kind, error, trace)
 
     def seat_at(self, seat: int, live_from: int = 0) -> None:
         """Sets the robot's seat, and the number of the first event to react to."""
