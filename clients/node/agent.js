@@ -137,6 +137,7 @@ async function playTicket(server, ticket) {
           for (const { handle, update, [update]: content } of updates) {
             if (!update) continue; // Of a kind that is newer than the .proto files.
             if (content.reason === "DETACH_REASON_SERVER_STOPPING") continue; // The end of the stream follows.
+            if (update === "refused" && !FINAL.includes(content.code)) throw (lost = new Error(content.message)); // For example, the room is gone from its server.
             const isOver = update === "attached" && outcomes.some(({ game_id, over }) => over && game_id === content.game_id);
             if (isOver) { // The connection was lost before the tournament counted the game.
               stream.write({ commands: [{ handle, detach: {} }] });

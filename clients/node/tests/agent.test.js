@@ -80,6 +80,7 @@ const ask = (decision_id, ...bytes) => ({ handle: 0, decision: { decision_id, ac
 const events = (...list) => ({ handle: 0, events: { events: list } });
 const ended = (sequence) => ({ sequence, game_ended: { standings: STANDINGS } });
 const attached = { handle: 0, attached: { seat: 2, next_sequence: 1 } };
+const refused = (reason, message, code = "UNAUTHENTICATED") => ({ handle: 0, refused: { reason, message, code: grpc.status[code] } });
 const detached = (reason) => ({ handle: 0, detached: { reason: `DETACH_REASON_${reason}` } });
 
 for (const [bytes, actions] of [
@@ -250,7 +251,7 @@ test("a refused decision is answered again, and the seat is taken back from its 
 });
 
 for (const [what, updates, message] of [
-  ["a refusal", [{ refused: { reason: "TICKET_UNKNOWN", message: "join again" } }], /refused: join again \(TICKET_UNKNOWN\)/],
+  ["a refusal", [refused("TICKET_UNKNOWN", "join again")], /refused: join again \(TICKET_UNKNOWN\)/],
   ["a newer connection", [detached("SUPERSEDED")], /the seat is lost \(DETACH_REASON_SUPERSEDED\)/],
   [
     "an aborted game",
@@ -267,6 +268,23 @@ for (const [what, updates, message] of [
     assert.equal(server.remaining.length, 0);
   });
 }
+
+test("a command that is refused for now is no error and causes a reconnection", async () => {
+  const server = await serve(
+    async (stream, read) => {
+      await read();
+      stream.write({ updates: [attached, ask(1, 1)] });
+      await read();
+      stream.write({ updates: [refused("ROOM_GONE", "connect again", "UNAVAILABLE")] });
+    },
+    async (stream, read) => {
+      await read();
+      stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+    },
+  );
+  assert.deepEqual(await play({ address: server.address, ticket: "a ticket" }), { seat: 2, standings: STANDINGS });
+  assert.equal(server.remaining.length, 0);
+});
 
 test("TLS with an authority of its own, and a token with every call", async () => {
   const game = async (stream, read) => {
@@ -344,7 +362,7 @@ test("a tournament: several games at a time, through lost connections, to its en
       await attach(read);
       stream.write({ updates: [{ handle: 0, attached: { game_id: "b", seat: 2 } }, ask(7, 1)] });
       await answer(read);
-      stream.write({ updates: [{ handle: 1, refused: { reason: "TICKET_UNKNOWN", message: "its room is gone" } }] });
+      stream.write({ updates: [{ ...refused("TICKET_UNKNOWN", "its room is gone"), handle: 1 }] });
       stream.write({ updates: [{ handle: 2, entered: { participant: 5 } }, over(2)] });
       stream.write({ updates: [events(ended(1)), detached("GAME_OVER")] });
     },
@@ -384,7 +402,7 @@ test("a game of a tournament that is over is not played again", async () => {
 });
 
 for (const [what, updates] of [
-  ["whose room is gone", [{ handle: 0, refused: { reason: "TICKET_UNKNOWN", message: "join again" } }]],
+  ["whose room is gone", [refused("TICKET_UNKNOWN", "join again")]],
   ["that a newer connection took", [attached, detached("SUPERSEDED")]],
 ]) {
   test(`the result of a game is known, also of one ${what} after its end`, async () => {
