@@ -1,7 +1,7 @@
 // The connection to the server that served this page, with a typed client for each service
 // (gRPC-web over the page's origin). Errors are put into words in faults.ts.
 
-import { createClient } from "@connectrpc/connect";
+import { createClient, type Transport } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { AnalysisService } from "../gen/chefshat/v1/analysis_service_pb";
 import { PlayService } from "../gen/chefshat/v1/play_service_pb";
@@ -16,11 +16,19 @@ import { repeat } from "./repeat";
 import { showSecrets } from "./secrets";
 import { authorize } from "./token";
 
-/** gRPC-web to the origin of the page. */
-export const transport = createGrpcWebTransport({
+/** Deadline of a unary call that sets none itself, milliseconds. Streams have none. */
+const CALL_LIMIT_MS = 15_000;
+
+const grpcWeb = createGrpcWebTransport({
   baseUrl: location.origin,
   interceptors: [repeat, authorize, showSecrets, askHeartbeats],
 });
+
+/** gRPC-web to the origin of the page. */
+export const transport: Transport = {
+  stream: grpcWeb.stream,
+  unary: (method, signal, timeoutMs = CALL_LIMIT_MS, ...rest) => grpcWeb.unary(method, signal, timeoutMs, ...rest),
+};
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);
@@ -38,6 +46,3 @@ export const recordApi = createClient(RecordService, transport);
 export const analysisApi = createClient(AnalysisService, transport);
 /** Tournaments, their results, the leaderboard. */
 export const tournamentApi = createClient(TournamentService, transport);
-
-/** Deadline of a unary call, milliseconds. Streams have none. */
-export const CALL_LIMIT_MS = 15_000;

@@ -5,14 +5,14 @@ import { useEffect, useState } from "preact/hooks";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import type { GetServerInfoResponse } from "../gen/chefshat/v1/server_service_pb";
 import { askUntilAnswered } from "./asking";
-import { CALL_LIMIT_MS, serverApi } from "./client";
+import { serverApi } from "./client";
 import { wordsOf } from "./faults";
 
 let asked: Promise<GetServerInfoResponse> | undefined;
 
 /** Version, presets, built-in agents, limits. */
 export function serverInfo(): Promise<GetServerInfoResponse> {
-  asked ??= serverApi.getServerInfo({}, { timeoutMs: CALL_LIMIT_MS }).catch((error: unknown) => {
+  asked ??= serverApi.getServerInfo({}).catch((error: unknown) => {
     // The next call tries again.
     asked = undefined;
     throw error;
@@ -24,7 +24,7 @@ export function serverInfo(): Promise<GetServerInfoResponse> {
 export async function aheadMs(): Promise<number> {
   const askedMs = Date.now();
   try {
-    const { receivedAtUs, sentAtUs } = await serverApi.getClock({}, { timeoutMs: CALL_LIMIT_MS });
+    const { receivedAtUs, sentAtUs } = await serverApi.getClock({});
     return Number((receivedAtUs + sentAtUs) / 2_000n) - (askedMs + Date.now()) / 2;
   } catch {
     return 0;

@@ -3,7 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { type Signal, signal } from "@preact/signals";
-import { CALL_LIMIT_MS, tableApi } from "../api/client";
+import { tableApi } from "../api/client";
 import { faultOf, inWords, isPassing } from "../api/faults";
 import { type Following, follow } from "../api/follow";
 import {
@@ -67,7 +67,7 @@ export function startAttending(ticket: string): Attending {
     };
     for (let attempt = 1; ; attempt += 1) {
       try {
-        const response = await tableApi.report(request, { timeoutMs: CALL_LIMIT_MS });
+        const response = await tableApi.report(request);
         apply(response.state);
         return outcomeOf(response);
       } catch (thrown) {

@@ -1,7 +1,7 @@
 // A room for someone without a seat: its players, how to join or watch; for its creator, how to
 // invite others and how to close it.
 
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { tableTicket } from "../attend/ticket";
@@ -26,8 +26,7 @@ const EVERY_MS = 2000;
 /** The page of a room without a seat. */
 export function Doorway({ roomId }: { roomId: string }) {
   const words = t().lobby.door;
-  const ask = async (signal: AbortSignal) =>
-    (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room;
+  const ask = async (signal: AbortSignal) => (await roomApi.getRoom({ roomId }, { signal })).room;
   const { value: room, fault } = usePolled(ask, EVERY_MS, roomId);
   if (!room) {
     if (!fault) return <p class="soft">{t().common.loading}</p>;

@@ -1,6 +1,6 @@
 // Resolves a join code before the person enters a name. Taking a seat is in seat.ts.
 
-import { CALL_LIMIT_MS, roomApi, tournamentApi } from "../api/client";
+import { roomApi, tournamentApi } from "../api/client";
 import { faultOf } from "../api/faults";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 import { canonical, saidRoom } from "./seat";
@@ -12,7 +12,7 @@ export type Found =
 
 /** Resolves a code. Throws JOIN_CODE_WRONG if it belongs to nothing. */
 export async function lookUp(code: string, signal?: AbortSignal): Promise<Found> {
-  const call = { ...(signal && { signal }), timeoutMs: CALL_LIMIT_MS };
+  const call = signal && { signal };
   const asked = { joinCode: canonical(code) };
   try {
     return { kind: "room", room: saidRoom((await roomApi.getRoom(asked, call)).room) };

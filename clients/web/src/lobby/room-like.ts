@@ -1,7 +1,7 @@
 // Playing again: a room with the rules, times and agents of another and its other seats free.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import { faultOf } from "../api/faults";
 import { SECRET_HEADER } from "../api/secrets";
 import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
@@ -44,7 +44,7 @@ export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat
   const room = await roomOfTicket(roomId, ticket);
   const made = await createRoom(requestLike(room));
   try {
-    await roomApi.setNextRoom({ roomId, ticket, joinCode: made.joinCode }, { timeoutMs: CALL_LIMIT_MS });
+    await roomApi.setNextRoom({ roomId, ticket, joinCode: made.joinCode });
   } catch (thrown) {
     if (faultOf(thrown).reason === "NEXT_ROOM_SET") {
       await closeRoom(made.room.roomId);
@@ -59,8 +59,7 @@ export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat
 /** A room as its participants see it, with the join code of the room in which they play again. */
 export async function roomOfTicket(roomId: string, ticket: string, signal?: AbortSignal): Promise<Room> {
   const headers = { [SECRET_HEADER]: ticket };
-  const call = { headers, timeoutMs: CALL_LIMIT_MS, ...(signal && { signal }) };
-  const { room } = await roomApi.getRoom({ roomId }, call);
+  const { room } = await roomApi.getRoom({ roomId }, { headers, ...(signal && { signal }) });
   return saidRoom(room);
 }
 

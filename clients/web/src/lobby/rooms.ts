@@ -1,6 +1,6 @@
 // The rooms of the server, for the lobby.
 
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import { faultOf } from "../api/faults";
 import type { AskPage } from "../api/pages";
 import {
@@ -17,7 +17,7 @@ import { giveUpSeat } from "./seat";
 /** Requests the rooms in a state, newest first. Aborted rooms are left out. */
 export function roomsIn(state: RoomState): AskPage<Room> {
   return async (page, signal) => {
-    const { rooms, nextPageToken } = await roomApi.listRooms({ state, ...page }, { signal, timeoutMs: CALL_LIMIT_MS });
+    const { rooms, nextPageToken } = await roomApi.listRooms({ state, ...page }, { signal });
     return { items: rooms, nextPageToken };
   };
 }
@@ -29,7 +29,7 @@ const over = new Set<string>();
 export async function openRooms(roomIds: readonly string[], signal: AbortSignal): Promise<Room[]> {
   const ask = async (roomId: string): Promise<Room[]> => {
     try {
-      const { room } = await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS });
+      const { room } = await roomApi.getRoom({ roomId }, { signal });
       if (room?.state === RoomState.WAITING || room?.state === RoomState.PLAYING) return [room];
       over.add(roomId);
     } catch (error) {

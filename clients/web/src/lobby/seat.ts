@@ -3,7 +3,7 @@
 // them a reload would lose the seat.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
@@ -65,7 +65,7 @@ export const {
 /** Frees a seat before the game starts, and deletes it here. */
 export async function giveBackSeat(roomId: string): Promise<void> {
   const held = heldSeat(roomId);
-  if (held) await roomApi.leaveRoom({ ticket: held.ticket }, { timeoutMs: CALL_LIMIT_MS });
+  if (held) await roomApi.leaveRoom({ ticket: held.ticket });
   giveUpSeat(roomId);
 }
 
@@ -100,16 +100,13 @@ export async function takeSeat(
   kind: ParticipantKind = ParticipantKind.HUMAN,
   key = nameKey(),
 ): Promise<Room> {
-  const joined = await roomApi.joinRoom(
-    {
-      joinCode: canonical(code),
-      name: name.trim(),
-      kind,
-      nameKey: key,
-      ...(seat === undefined ? {} : { seat }),
-    },
-    { timeoutMs: CALL_LIMIT_MS },
-  );
+  const joined = await roomApi.joinRoom({
+    joinCode: canonical(code),
+    name: name.trim(),
+    kind,
+    nameKey: key,
+    ...(seat === undefined ? {} : { seat }),
+  });
   const room = saidRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
   remember(SEAT + room.roomId, JSON.stringify(held));
@@ -124,7 +121,7 @@ export async function takeSeat(
 export async function createRoom(
   request: MessageInitShape<typeof CreateRoomRequestSchema>,
 ): Promise<{ room: Room; joinCode: string }> {
-  const made = await roomApi.createRoom(request, { timeoutMs: CALL_LIMIT_MS });
+  const made = await roomApi.createRoom(request);
   const room = saidRoom(made.room);
   const wizards = (request.seats ?? []).flatMap(({ filledBy }, seat) => (filledBy?.case === "wizard" ? [seat] : []));
   const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken, wizards };
@@ -137,7 +134,7 @@ export async function createRoom(
 /** Closes a room that this device created; a running game is aborted. */
 export async function closeRoom(roomId: string): Promise<void> {
   const hosted = hostedRoom(roomId);
-  if (hosted) await roomApi.closeRoom({ roomId, ownerToken: hosted.ownerToken }, { timeoutMs: CALL_LIMIT_MS });
+  if (hosted) await roomApi.closeRoom({ roomId, ownerToken: hosted.ownerToken });
 }
 
 /** The last name used on this device. */

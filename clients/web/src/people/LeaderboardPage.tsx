@@ -2,7 +2,7 @@
 // uncertainty.
 
 import { useState } from "preact/hooks";
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { tournamentApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
@@ -42,7 +42,7 @@ export function LeaderboardPage() {
   const ask = (signal: AbortSignal) =>
     tournamentApi.getLeaderboard(
       { kind: KINDS[kind], minGames: Number(minGames), limit: Math.min(lines + 1, MAX_LINES) },
-      { signal, timeoutMs: CALL_LIMIT_MS },
+      { signal },
     );
   const { value, fault } = usePolled(ask, EVERY_MS, `${kind} ${minGames} ${lines}`);
   const rated = value?.rated.slice(0, lines) ?? [];

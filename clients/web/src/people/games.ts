@@ -1,6 +1,6 @@
 // A participant's games from the server's records: found by name, newest first, with totals.
 
-import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
+import { recordApi, tournamentApi } from "../api/client";
 import { type AskPage, LARGEST_PAGE } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import {
@@ -50,14 +50,14 @@ export function gamesOf(name: string, fingerprint: string): AskPage<OwnGame> {
     const asked = { filter: { participant: name }, newestFirst: true, ...page };
     // Most games may be of others with this name.
     if (fingerprint !== "") asked.pageSize = LARGEST_PAGE;
-    const { records, nextPageToken } = await recordApi.listRecords(asked, { signal, timeoutMs: CALL_LIMIT_MS });
+    const { records, nextPageToken } = await recordApi.listRecords(asked, { signal });
     return { items: records.flatMap((record) => ownGame(record, name, fingerprint) ?? []), nextPageToken };
   };
 }
 
 /** Requests a participant's lines of the leaderboard; with a fingerprint one line. */
 export async function ratedAs(name: string, fingerprint: string, signal: AbortSignal): Promise<Ratings> {
-  const { rated } = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
+  const { rated } = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal });
   const own = (line: Rated) => line.name === name && [line.nameFingerprint, ""].includes(fingerprint);
   return { lines: rated.filter(own), complete: rated.length < MAX_LINES };
 }

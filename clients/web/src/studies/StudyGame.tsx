@@ -2,8 +2,9 @@
 
 import { type Signal, signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import { type Fault, faultOf, isPassing, wordsOf } from "../api/faults";
+import { SECRET_HEADER } from "../api/secrets";
 import { StudyHide, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
 import { type Hideable, leaveOut } from "../hiding";
 import { t } from "../i18n";
@@ -154,8 +155,7 @@ function startStudyTable({ roomId, ticket }: StudyShownGame, title: string): Stu
   const load = async () => {
     while (!stopped) {
       try {
-        const call = { timeoutMs: CALL_LIMIT_MS, headers: { "chefshat-secret": ticket } };
-        const { room } = await roomApi.getRoom({ roomId }, call);
+        const { room } = await roomApi.getRoom({ roomId }, { headers: { [SECRET_HEADER]: ticket } });
         if (stopped || !room) return;
         session.value = startSession({ ticket }, { ...tableFromRoom(room), roomName: title }, true);
         return;

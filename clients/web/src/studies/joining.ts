@@ -1,7 +1,6 @@
 // Taking part by a study's open link. For somebody with an id at a panel, this device keeps the
 // request, so that the same link leads to the same participation.
 
-import { CALL_LIMIT_MS } from "../api/client";
 import { faultOf } from "../api/faults";
 import { fromHex, hex } from "../hex";
 import { recallObject, remember, remembered } from "../store";
@@ -27,7 +26,7 @@ export async function join(openLink: string, idParameter: string): Promise<strin
   if (stored !== undefined && keptRequest(stored) === undefined) keep("");
   try {
     const request = { openLink, panelId, requestId, device: thisDevice() };
-    const { link } = await participationApi.joinStudy(request, { timeoutMs: CALL_LIMIT_MS });
+    const { link } = await participationApi.joinStudy(request);
     keep(link);
     return link;
   } catch (thrown) {

@@ -2,7 +2,6 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { CALL_LIMIT_MS } from "../api/client";
 import { isSecret } from "../api/secrets";
 import type {
   Study,
@@ -38,12 +37,12 @@ export function keepOwnerToken(studyId: string, ownerToken: string): void {
 export async function ownStudies(signal: AbortSignal): Promise<Study[]> {
   const ids = [...remembered().keys()].flatMap((key) => (key.startsWith(STORED) ? key.slice(STORED.length) : []));
   const ownerTokens = ids.flatMap((id) => ownerTokenOf(id) ?? []).slice(0, MAX_TOKENS);
-  return (await studyApi.listStudies({ ownerTokens }, { signal, timeoutMs: CALL_LIMIT_MS })).studies;
+  return (await studyApi.listStudies({ ownerTokens }, { signal })).studies;
 }
 
 /** The settings of a study, with its pictures. */
 export async function settingsOfStudy(studyId: string): Promise<StudySettings | undefined> {
-  return (await studyApi.getStudy(ownership(studyId), call)).study?.settings;
+  return (await studyApi.getStudy(ownership(studyId))).study?.settings;
 }
 
 /** Creates a study and stores its owner token; returns its id. */
@@ -51,13 +50,11 @@ export async function createStudy(
   settings: MessageInitShape<typeof StudySettingsSchema>,
   requestId: Uint8Array,
 ): Promise<string> {
-  const { study, ownerToken } = await studyApi.createStudy({ settings, requestId }, call);
+  const { study, ownerToken } = await studyApi.createStudy({ settings, requestId });
   if (!study) throw new Error("the server did not say which study it is");
   keepOwnerToken(study.studyId, ownerToken);
   return study.studyId;
 }
-
-const call = { timeoutMs: CALL_LIMIT_MS };
 
 /**
  * Adds participants by their codes, or as many as `count` with codes of the server. `together`: they play
@@ -69,15 +66,15 @@ export async function addParticipants(
   pseudonyms: string[],
   together: boolean,
 ): Promise<StudyLink[]> {
-  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms, together }, call)).links;
+  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms, together })).links;
 }
 
 export async function addTestParticipants(studyId: string, count: number): Promise<StudyLink[]> {
-  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, test: true }, call)).links;
+  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, test: true })).links;
 }
 
 export async function linksOf(studyId: string): Promise<StudyLink[]> {
-  return (await studyApi.listStudyLinks(ownership(studyId), call)).links;
+  return (await studyApi.listStudyLinks(ownership(studyId))).links;
 }
 
 /** Removes a participant, and returns it as it is then. */
@@ -86,17 +83,17 @@ export async function removeFromStudy(
   number: number,
   replace: boolean,
 ): Promise<StudyParticipant | undefined> {
-  return (await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace }, call)).participant;
+  return (await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace })).participant;
 }
 
 /** Deletes the data of a participant, and returns what is left. */
 export async function deleteDataOf(studyId: string, number: number): Promise<StudyParticipant | undefined> {
-  return (await studyApi.deleteStudyParticipant({ ...ownership(studyId), number }, call)).participant;
+  return (await studyApi.deleteStudyParticipant({ ...ownership(studyId), number })).participant;
 }
 
 /** Nobody may begin any more. */
 export async function closeStudy(studyId: string): Promise<void> {
-  await studyApi.closeStudy(ownership(studyId), call);
+  await studyApi.closeStudy(ownership(studyId));
 }
 
 /**
@@ -105,7 +102,7 @@ export async function closeStudy(studyId: string): Promise<void> {
  */
 export async function deleteStudy(studyId: string, force: boolean): Promise<void> {
   // No deadline: the server answers when all records are deleted.
-  await studyApi.deleteStudy({ ...ownership(studyId), force });
+  await studyApi.deleteStudy({ ...ownership(studyId), force }, { timeoutMs: 0 });
   remember(STORED + studyId, null);
 }
 

@@ -3,7 +3,6 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { effect, type Signal, signal } from "@preact/signals";
-import { CALL_LIMIT_MS } from "../api/client";
 import { type Fault, faultOf, isPassing } from "../api/faults";
 import { type Following, follow, type Link } from "../api/follow";
 import {
@@ -81,7 +80,6 @@ export function startParticipating(given: string): Participating {
   const view = signal<StudyView | undefined>(undefined);
   const fault = signal<Fault | undefined>(undefined);
   const link = signal<Link>("connecting");
-  const call = { timeoutMs: CALL_LIMIT_MS };
   let session = "";
   let progress: Progress = { step: -1, reachedAtMs: 0, saved: [] };
   let following: Following | undefined;
@@ -108,7 +106,7 @@ export function startParticipating(given: string): Participating {
     forgetDeleted(next);
   };
 
-  const openStudy = (link: string) => participationApi.openStudy({ link, device: thisDevice() }, call);
+  const openStudy = (link: string) => participationApi.openStudy({ link, device: thisDevice() });
 
   /** An open link leads to the participant's own, which the page's address has from then on. */
   const joinFirst = async (thrown: unknown) => {
@@ -215,18 +213,18 @@ export function startParticipating(given: string): Participating {
       if (progress.step !== step) progress = { step, reachedAtMs: performance.now(), saved: [] };
       return progress;
     },
-    consent: () => act((at) => participationApi.giveConsent(at, call)),
-    answer: (answers) => act((at) => participationApi.answerQuestionnaire({ ...at, answers }, call)),
+    consent: () => act((at) => participationApi.giveConsent(at)),
+    answer: (answers) => act((at) => participationApi.answerQuestionnaire({ ...at, answers })),
     save: async (answers, step) => {
-      await participationApi.saveAnswers({ session, step, answers }, call);
+      await participationApi.saveAnswers({ session, step, answers });
     },
-    proceed: () => act((at) => participationApi.continueStudy(at, call)),
-    picture: async (picture) => (await participationApi.getStudyPicture({ link: secret, picture }, call)).data,
+    proceed: () => act((at) => participationApi.continueStudy(at)),
+    picture: async (picture) => (await participationApi.getStudyPicture({ link: secret, picture })).data,
     sendTraces: async (gameId, traces) => {
-      await participationApi.recordTraces({ session, gameId, traces }, call);
+      await participationApi.recordTraces({ session, gameId, traces });
     },
     withdraw: async (deleteData) => {
-      const answer = await participationApi.withdrawFromStudy({ link: secret, deleteData }, call);
+      const answer = await participationApi.withdrawFromStudy({ link: secret, deleteData });
       leave();
       presence.value = "open";
       view.value = answer.view;

@@ -3,7 +3,7 @@
 // (tournaments/participation.ts).
 
 import { batch, computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
-import { CALL_LIMIT_MS, playApi } from "../api/client";
+import { playApi } from "../api/client";
 import { faultOf, inWords, isPassing } from "../api/faults";
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import type { Hint, SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
@@ -152,7 +152,7 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     hint.value = { decision: decision.id, hint: undefined };
     try {
       const command = { case: "hint" as const, value: { decisionId: decision.id } };
-      const reply = await playApi.act({ ticket, command }, { timeoutMs: CALL_LIMIT_MS });
+      const reply = await playApi.act({ ticket, command });
       hint.value = { decision: decision.id, hint: reply.hint };
     } catch (thrown) {
       hint.value = last;
@@ -163,7 +163,7 @@ export function startActing(ticket: string, table: TableState, seat: number | un
   const send = async (command: Parameters<typeof playApi.act>[0]["command"]) => {
     if (!command) return;
     try {
-      await playApi.act({ ticket, command }, { timeoutMs: CALL_LIMIT_MS });
+      await playApi.act({ ticket, command });
     } catch (thrown) {
       trouble.value = inWords(thrown);
     }

@@ -1,7 +1,7 @@
 // Asks for a room until the server answers.
 
 import { askUntilAnswered } from "../api/asking";
-import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { roomApi } from "../api/client";
 import type { Fault } from "../api/faults";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 
@@ -11,6 +11,6 @@ export function askRoom(
   isWanted: () => boolean,
   onFault?: (fault: Fault) => void,
 ): Promise<Room | undefined> {
-  const ask = async () => (await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS })).room;
+  const ask = async () => (await roomApi.getRoom({ roomId })).room;
   return askUntilAnswered(ask, isWanted, onFault);
 }

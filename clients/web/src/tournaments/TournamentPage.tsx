@@ -3,7 +3,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { tournamentApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
@@ -98,8 +98,7 @@ function invitedWith(): string | null {
 function Invited({ tournamentId, code }: { tournamentId: string; code: string }) {
   const ask = async (signal: AbortSignal) => {
     // The code alone: with the id of a private tournament, the server would not say that the code is wrong.
-    const call = { signal, timeoutMs: CALL_LIMIT_MS };
-    return (await tournamentApi.getTournament({ joinCode: canonical(code) }, call)).tournament;
+    return (await tournamentApi.getTournament({ joinCode: canonical(code) }, { signal })).tournament;
   };
   const { value: tournament, fault } = usePolled(ask, INVITED_EVERY_MS, code);
   const [navigate] = useState(navigateFromHere);

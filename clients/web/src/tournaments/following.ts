@@ -3,7 +3,7 @@
 
 import { type Signal, signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { tournamentApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
 import { allPages } from "../api/pages";
 import { usePolled } from "../api/poll";
@@ -72,8 +72,7 @@ export function useConfidence({ tournament }: LiveTournament): readonly OrderCon
   const { tournamentId, gamesOver } = tournament;
   const ask = async (abort: AbortSignal) => {
     if (gamesOver === 0) return [];
-    const call = { signal: abort, timeoutMs: CALL_LIMIT_MS };
-    return (await tournamentApi.getTournamentResults({ tournamentId }, call)).confidence;
+    return (await tournamentApi.getTournamentResults({ tournamentId }, { signal: abort })).confidence;
   };
   return usePolled(ask, quietMs(tournament), useChanges(tournament)).value ?? [];
 }
@@ -103,9 +102,9 @@ function useChanges({ tournamentId, state, round, gamesOver, gamesPlaying }: Tou
 }
 
 function listGames(tournamentId: string, abort: AbortSignal): Promise<TournamentGame[]> {
-  const call = { signal: abort, timeoutMs: CALL_LIMIT_MS };
   return allPages(async (pageToken) => {
-    const answer = await tournamentApi.listTournamentGames({ tournamentId, pageSize: PAGE_SIZE, pageToken }, call);
+    const asked = { tournamentId, pageSize: PAGE_SIZE, pageToken };
+    const answer = await tournamentApi.listTournamentGames(asked, { signal: abort });
     return { items: answer.games, nextPageToken: answer.nextPageToken };
   }, MAX_PAGES);
 }

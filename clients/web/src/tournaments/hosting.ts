@@ -2,7 +2,7 @@
 // device stores for it. Taking part is in place.ts.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
@@ -54,10 +54,7 @@ function keepLinks(tournamentId: string, change: (links: HeldPlace[]) => HeldPla
 
 /** Creates a tournament and stores its secrets; returns its id. */
 export async function createTournament(settings: MessageInitShape<typeof TournamentSettingsSchema>): Promise<string> {
-  const { tournament, joinCode, ownerToken } = await tournamentApi.createTournament(
-    { settings },
-    { timeoutMs: CALL_LIMIT_MS },
-  );
+  const { tournament, joinCode, ownerToken } = await tournamentApi.createTournament({ settings });
   if (!tournament) throw new Error("the server did not say which tournament it is");
   keepHosted(tournament.tournamentId, { joinCode, ownerToken });
   keepSecret(ownerToken, tournament.settings?.policy);
@@ -66,31 +63,30 @@ export async function createTournament(settings: MessageInitShape<typeof Tournam
 
 /** Starts a tournament that this device created. */
 export async function startTournament(tournamentId: string): Promise<void> {
-  await tournamentApi.startTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.startTournament(ownership(tournamentId));
 }
 
 /** Closes a tournament that this device created; running games are aborted. */
 export async function closeTournament(tournamentId: string): Promise<void> {
-  await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.closeTournament(ownership(tournamentId));
 }
 
 /** Pauses or resumes a tournament that this device created. */
 export async function setPaused(tournamentId: string, paused: boolean): Promise<void> {
-  const call = { timeoutMs: CALL_LIMIT_MS };
-  if (paused) await tournamentApi.pauseTournament(ownership(tournamentId), call);
-  else await tournamentApi.resumeTournament(ownership(tournamentId), call);
+  if (paused) await tournamentApi.pauseTournament(ownership(tournamentId));
+  else await tournamentApi.resumeTournament(ownership(tournamentId));
 }
 
 /** Removes a participant of a tournament that this device created. */
 export async function removeParticipant(tournamentId: string, participant: number): Promise<void> {
-  await tournamentApi.removeParticipant({ ...ownership(tournamentId), participant }, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.removeParticipant({ ...ownership(tournamentId), participant });
   dropLinksTo(tournamentId, participant);
 }
 
 /** Gives the place of a participant to a built-in agent. */
 export async function replaceByAgent(tournamentId: string, participant: number, builtInAgent: string): Promise<void> {
   const request = { ...ownership(tournamentId), participant, builtInAgent };
-  await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.replaceParticipant(request);
   dropLinksTo(tournamentId, participant);
 }
 
@@ -106,33 +102,30 @@ export async function replaceByPerson(tournamentId: string, participant: number,
     kind: ParticipantKind.HUMAN,
     requestId: crypto.getRandomValues(new Uint8Array(32)),
   };
-  const { ticket } = await tournamentApi.replaceParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+  const { ticket } = await tournamentApi.replaceParticipant(request);
   dropLinksTo(tournamentId, participant);
   keepLinks(tournamentId, (links) => [...links, { ticket, participant, name: name.trim() }]);
 }
 
 /** Postpones a game of a tournament that this device created. */
 export async function postponeGame(tournamentId: string, game: number): Promise<void> {
-  await tournamentApi.postponeGame({ ...ownership(tournamentId), game }, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.postponeGame({ ...ownership(tournamentId), game });
 }
 
 /** Calls a due or void game before all others. */
 export async function callGame(tournamentId: string, game: number): Promise<void> {
-  await tournamentApi.callGame({ ...ownership(tournamentId), game }, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.callGame({ ...ownership(tournamentId), game });
 }
 
 /** Adds a participant at a physical table to a tournament that this device created. */
 export async function addAtTable(tournamentId: string, name: string, kind: ParticipantKind): Promise<void> {
   const request = { ...ownership(tournamentId), name: name.trim(), kind };
-  await tournamentApi.addTableParticipant(request, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.addTableParticipant(request);
 }
 
 /** Stores the ticket of the table of a physical game in progress on this device; returns its room. */
 export async function takeTable(tournamentId: string, game: number): Promise<string> {
-  const { roomId, tableTicket } = await tournamentApi.getPhysicalTable(
-    { ...ownership(tournamentId), game },
-    { timeoutMs: CALL_LIMIT_MS },
-  );
+  const { roomId, tableTicket } = await tournamentApi.getPhysicalTable({ ...ownership(tournamentId), game });
   keepTableTicket(roomId, tableTicket);
   return roomId;
 }

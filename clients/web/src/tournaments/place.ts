@@ -1,7 +1,7 @@
 // Joining and leaving a tournament, and the place that this device stores. Playing is in
 // participation.ts.
 
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { linksBringing } from "../lobby/bringing";
@@ -37,12 +37,12 @@ export function forgetPlace(tournamentId: string): void {
 
 /** Leaves a tournament: before the start the place is free again. */
 export async function leaveTournament(tournamentId: string, { ticket }: HeldPlace): Promise<void> {
-  await tournamentApi.withdrawParticipant({ tournamentId, ticket }, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.withdrawParticipant({ tournamentId, ticket });
 }
 
 /** Moves a game of this device's participant to the end of the queue. */
 export async function postponeOwnGame(tournamentId: string, { ticket }: HeldPlace, game: number): Promise<void> {
-  await tournamentApi.postponeGame({ tournamentId, ticket, game }, { timeoutMs: CALL_LIMIT_MS });
+  await tournamentApi.postponeGame({ tournamentId, ticket, game });
 }
 
 /** Links that bring a place to another device. */
@@ -61,10 +61,13 @@ export const {
 
 /** Joins as a person; `key` is that of the name. Returns the tournament's id. */
 export async function takePlace(tournamentId: string, code: string, name: string, key = nameKey()): Promise<string> {
-  const joined = await tournamentApi.joinTournament(
-    { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN, nameKey: key },
-    { timeoutMs: CALL_LIMIT_MS },
-  );
+  const joined = await tournamentApi.joinTournament({
+    tournamentId,
+    joinCode: canonical(code),
+    name: name.trim(),
+    kind: ParticipantKind.HUMAN,
+    nameKey: key,
+  });
   const id = joined.tournament?.tournamentId ?? tournamentId;
   const held: HeldPlace = { ticket: joined.ticket, participant: joined.participant, name: name.trim() };
   remember(`tournament.${id}`, JSON.stringify(held));

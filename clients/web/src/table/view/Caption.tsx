@@ -1,7 +1,7 @@
 // The name of a room at its table, and how many spectators watch. They are no events of a game, so the
 // room is polled.
 
-import { CALL_LIMIT_MS, roomApi } from "../../api/client";
+import { roomApi } from "../../api/client";
 import { usePolled } from "../../api/poll";
 import { t } from "../../i18n";
 import type { TableState } from "../model/state";
@@ -22,7 +22,7 @@ export function Caption({ table, watched = false }: CaptionProps) {
   const over = phase === "gameOver" || phase === "aborted";
   const ask = async (signal: AbortSignal) => {
     if (over || !policy?.spectators) return 0;
-    const { room } = await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS });
+    const { room } = await roomApi.getRoom({ roomId }, { signal });
     return room?.spectators ?? 0;
   };
   const { value: spectators } = usePolled(ask, EVERY_MS, `${roomId} ${over}`);

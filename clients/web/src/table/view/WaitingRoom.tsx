@@ -3,7 +3,7 @@
 // waiting room, so the room is polled.
 
 import type { ComponentChildren } from "preact";
-import { CALL_LIMIT_MS, roomApi } from "../../api/client";
+import { roomApi } from "../../api/client";
 import { usePolled } from "../../api/poll";
 import { hidden } from "../../hiding";
 import { t } from "../../i18n";
@@ -34,8 +34,7 @@ interface WaitingRoomProps {
 export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
   const words = t().table.room;
   const { roomId } = table;
-  const ask = async (signal: AbortSignal) =>
-    (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room;
+  const ask = async (signal: AbortSignal) => (await roomApi.getRoom({ roomId }, { signal })).room;
   const { value: room } = usePolled(ask, EVERY_MS, roomId);
   const seats = table.seats.map((seat): SeatState => {
     const connected = seat.seat === own || (room?.seats[seat.seat]?.connected ?? seat.connected);
