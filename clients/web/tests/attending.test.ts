@@ -12,6 +12,7 @@ import {
   TableServiceWatchResponseSchema,
 } from "../src/gen/chefshat/v1/table_service_pb";
 import { startLanguage } from "../src/i18n";
+import { AWAY } from "./refusals";
 import { stateOf } from "./table-state";
 
 let attending: Attending;
@@ -60,10 +61,7 @@ test.each([
 });
 
 test("a report whose response was lost is sent again with its id", async () => {
-  report
-    .mockRejectedValueOnce(new ConnectError("reset", Code.Unavailable))
-    .mockRejectedValueOnce(new ConnectError("reset", Code.Unavailable))
-    .mockResolvedValue(answers(ReportVerdict.ACCEPTED));
+  report.mockRejectedValueOnce(AWAY).mockRejectedValueOnce(AWAY).mockResolvedValue(answers(ReportVerdict.ACCEPTED));
   const outcome = attending.report(pass);
   await vi.runOnlyPendingTimersAsync();
   await vi.runOnlyPendingTimersAsync();
@@ -72,6 +70,28 @@ test("a report whose response was lost is sent again with its id", async () => {
   expect(ids).toHaveLength(3);
   expect(new Set(ids).size).toBe(1);
   expect(ids[0]).toMatch(/^[0-9a-f]{32}$/);
+});
+
+test("a report waits for a server that is away, but not longer than the page", async () => {
+  report.mockRejectedValue(AWAY);
+  let came: unknown;
+  void attending.report(pass).then((outcome) => {
+    came = outcome;
+  });
+  await vi.advanceTimersByTimeAsync(120_000);
+  expect(came).toBeUndefined();
+  report.mockResolvedValue(answers(ReportVerdict.ACCEPTED));
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(came).toEqual({ kind: "accepted" });
+  expect(new Set(report.mock.calls.map(([request]) => request.reportId)).size).toBe(1);
+
+  report.mockRejectedValue(AWAY);
+  void attending.report(pass);
+  await vi.advanceTimersByTimeAsync(1_000);
+  attending.stop();
+  const before = report.mock.calls.length;
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(report).toHaveBeenCalledTimes(before);
 });
 
 test("a refused report is not sent again, and says why", async () => {

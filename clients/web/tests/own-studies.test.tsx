@@ -47,7 +47,7 @@ import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
 import { eventually, root, settle } from "./mounted";
-import { refused } from "./study-fake";
+import { refused } from "./refusals";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TOKEN = "ab".repeat(48);

@@ -1,11 +1,12 @@
 // Polling: at once, at the interval, less often after errors, not while hidden, and never after the
 // page is gone.
 
-import { Code, ConnectError } from "@connectrpc/connect";
+import { Code } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { type Polled, usePolled } from "../src/api/poll";
+import { AWAY, tooMany } from "./refusals";
 
 const EVERY_MS = 1000;
 let root: HTMLElement;
@@ -51,7 +52,7 @@ test("after an error the last response stays, and requests slow down until one s
   let asked = 0;
   await shown(async () => {
     asked += 1;
-    if (asked === 2) throw new ConnectError("away", Code.Unavailable);
+    if (asked === 2) throw AWAY;
     return asked;
   });
   await pass(EVERY_MS);
@@ -61,6 +62,19 @@ test("after an error the last response stays, and requests slow down until one s
   expect(asked).toBe(2);
   await pass(EVERY_MS);
   expect(seen).toEqual({ value: 3, fault: null });
+});
+
+test("a limit that says when to try again is obeyed", async () => {
+  let asked = 0;
+  await shown(async () => {
+    asked += 1;
+    if (asked === 1) throw tooMany(20 * EVERY_MS);
+    return asked;
+  });
+  await pass(19 * EVERY_MS);
+  expect(asked).toBe(1);
+  await pass(EVERY_MS);
+  expect(seen).toEqual({ value: 2, fault: null });
 });
 
 test("a hidden page makes no request, and makes one at once when it is shown again", async () => {

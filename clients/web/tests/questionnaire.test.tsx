@@ -10,8 +10,8 @@ import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatte
 import { WithPictures } from "../src/studies/Pictures";
 import type { ItemAnswer } from "../src/studies/participating";
 import { Questionnaire } from "../src/studies/Questionnaire";
-import { eventually, root } from "./mounted";
-import { refused } from "./study-fake";
+import { eventually, root, type } from "./mounted";
+import { AWAY, refused } from "./refusals";
 
 const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
 const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
@@ -27,11 +27,7 @@ const field = (item: number, which = "input") => {
   if (!found) throw new Error(`${item} has no ${which}`);
   return found;
 };
-const type = (item: number, text: string) =>
-  act(() => {
-    field(item).value = text;
-    field(item).dispatchEvent(new Event("input", { bubbles: true }));
-  });
+const enter = (item: number, text: string) => type(field(item), text);
 const faults = () => [...root.querySelectorAll('[id$="-fault"]')].map((fault) => fault.textContent);
 
 /** The form of a questionnaire, and what it sends. */
@@ -62,7 +58,7 @@ test("an item is shown only for the answers that it depends on, and only then as
   expect(shownItems()).toEqual(["0", "2"]);
   await act(() => field(0).click());
   expect(shownItems()).toEqual(["0", "1"]);
-  await type(1, "50");
+  await enter(1, "50");
   expect(shownItems()).toEqual(["0", "1", "3"]);
   await send();
   expect(faults()).toEqual(["Please answer this question."]);
@@ -77,16 +73,16 @@ test("an item is shown only for the answers that it depends on, and only then as
 test("a number that is none, or too small or large, is corrected before it is sent", async () => {
   const { send, sent, values } = await shown([{ item: 0, text: "Your age?", optional: true, kind: AGE }]);
   for (const wrong of ["17", "100", "old", "20.5", "2e1", "-20"]) {
-    await type(0, wrong);
+    await enter(0, wrong);
     await send();
     expect(faults(), wrong).toEqual(["This is none of the numbers that can be answered."]);
     expect(field(0).getAttribute("aria-invalid"), wrong).toBe("true");
   }
   expect(sent).toEqual([]);
   // Without an answer it is left out.
-  await type(0, "");
+  await enter(0, "");
   expect(faults()).toEqual([]);
-  await type(0, " 20 ");
+  await enter(0, " 20 ");
   await send();
   expect(values()).toEqual([[0, 20]]);
 });
@@ -97,7 +93,7 @@ test("a wrong number is forgotten when its item is not shown any more", async ()
     { item: 1, text: "How long?", optional: true, kind: AGE, shownIf: [{ item: 0, answers: { options: [0] } }] },
   ]);
   await act(() => field(0).click());
-  await type(1, "old");
+  await enter(1, "old");
   await act(() => field(0).click());
   await act(() => field(0).click());
   expect(field(1).value).toBe("");
@@ -195,24 +191,52 @@ test("a question has markup, and its field a name without", async () => {
   expect(plainText(text)).toBe("1. How *sure* are you, really?");
 });
 
-test("what is still to be saved when the questionnaire is over is not saved in the next one", async () => {
+/** A questionnaire with a number, and the numbers that it saves; `save` answers each. */
+async function saving(save: () => Promise<void>) {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
-  const saves: [step: number, values: unknown][] = [];
-  let fail = (_: Error) => {};
+  const saves: [step: number, values: unknown[]][] = [];
   const part = {
     progress: () => ({ step: 3, reachedAtMs: 0, saved: [] }),
     save: (answers: ItemAnswer[], step: number) => {
       saves.push([step, answers.map(({ value }) => value?.value)]);
-      return new Promise<void>((_, reject) => {
-        fail = reject;
-      });
+      return save();
     },
     answer: async () => {},
   };
   const questionnaire = create(StudyShownQuestionnaireSchema, { items: [{ item: 0, text: "How old?", kind: AGE }] });
   await show(<Questionnaire questionnaire={questionnaire} part={part} />);
+  return saves;
+}
+
+test("what was entered without a connection is saved when it is back, as it is then", async () => {
+  let isCut = true;
+  const saves = await saving(async () => {
+    if (isCut) throw AWAY;
+  });
+  await enter(0, "20");
+  await vi.advanceTimersByTimeAsync(60_000);
+  const before = saves.length;
+  expect(before).toBeGreaterThan(1);
+  await enter(0, "21");
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(new Set(saves.slice(before).map(([, [age]]) => age))).toEqual(new Set([21]));
+  isCut = false;
+  await vi.advanceTimersByTimeAsync(60_000);
+  const after = saves.length;
+  expect(saves.at(-1)).toEqual([3, [21]]);
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(saves).toHaveLength(after);
+});
+
+test("what is still to be saved when the questionnaire is over is not saved in the next one", async () => {
+  let fail = (_: Error) => {};
+  const save = () =>
+    new Promise<void>((_, reject) => {
+      fail = reject;
+    });
+  const saves = await saving(save);
   for (const age of ["20", "21"]) {
-    await type(0, age);
+    await enter(0, age);
     await vi.advanceTimersByTimeAsync(500);
   }
   await act(() => render(null, root));

@@ -27,8 +27,9 @@ import { startTracing, targetOf } from "../src/studies/tracing";
 import { startLive } from "../src/table/model/live";
 import { emptyTable, seatFromParticipant } from "../src/table/model/state";
 import { SeatPanel } from "../src/table/view/SeatPanel";
-import { eventually, root } from "./mounted";
-import { fakeStudy, refused, viewOf } from "./study-fake";
+import { button, eventually, root, type } from "./mounted";
+import { refused } from "./refusals";
+import { fakeStudy, viewOf } from "./study-fake";
 
 const LINK = "Xk3_abcdefghijklmnopqrstuvwxy1";
 const CONSENT = { case: "consent" as const, value: { text: "We record your games.\n\nYou may stop.", version: "2" } };
@@ -86,8 +87,6 @@ const settled = () =>
   act(async () => {
     for (let turn = 0; turn < 5; turn += 1) await vi.advanceTimersByTimeAsync(0);
   });
-const button = (words: string) =>
-  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
 const press = async (words: string) => {
   const found = button(words);
   expect(found, words).toBeDefined();
@@ -125,10 +124,7 @@ test("a participant goes through all stages, and nothing is stored on the device
   await act(() => input(1, 'input[value="5"]').click());
   const slider = input(2, 'input[type="range"]');
   expect(slider.getAttribute("aria-valuetext")).toBe("no answer yet");
-  await act(() => {
-    slider.value = "35";
-    slider.dispatchEvent(new Event("input", { bubbles: true }));
-  });
+  await type(slider, "35");
   expect(input(2, 'input[type="range"]').getAttribute("aria-valuetext")).toBe("35, from 0 to 100");
   await act(() => root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[2]?.click());
   await act(() => root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[0]?.click());
@@ -481,11 +477,7 @@ test("what is entered is kept by the server, shown on another device, and its ti
   ]);
 
   // The next questionnaire begins empty, and its times at nothing.
-  await act(() => {
-    const slider = input(2, 'input[type="range"]');
-    slider.value = "35";
-    slider.dispatchEvent(new Event("input", { bubbles: true }));
-  });
+  await type(input(2, 'input[type="range"]'), "35");
   clock.mockReturnValue(900);
   await press("Send the answers");
   expect(root.querySelectorAll("input:checked")).toHaveLength(0);

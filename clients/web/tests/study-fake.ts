@@ -1,7 +1,7 @@
 // A study on a fake server: its views follow each other when the participant acts.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { Code, ConnectError } from "@connectrpc/connect";
+import { ConnectError } from "@connectrpc/connect";
 import { vi } from "vitest";
 import { StudyEndReason, type StudyItemAnswer, type StudyView, StudyViewSchema } from "../src/gen/chefshat/v1/study_pb";
 import {
@@ -15,19 +15,9 @@ import {
   SaveAnswersResponseSchema,
   WithdrawFromStudyResponseSchema,
 } from "../src/gen/chefshat/v1/study_service_pb";
-import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { participationApi } from "../src/studies/client";
 
 type Content = MessageInitShape<typeof StudyViewSchema>["content"];
-
-/** An error of the server with a reason. */
-export function refused(
-  reason: string,
-  code = Code.FailedPrecondition,
-  metadata: Record<string, string> = {},
-): ConnectError {
-  return new ConnectError(reason, code, undefined, [{ desc: ErrorInfoSchema, value: { reason, metadata } }]);
-}
 
 /** A view of a study with these stages. */
 export function viewOf(stages: readonly NonNullable<Content>[], step: number, traces = false): StudyView {

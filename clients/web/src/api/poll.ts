@@ -28,8 +28,9 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
     let timer: ReturnType<typeof setTimeout> | undefined;
     let slowdown = 1;
     let asking = false;
+    let retryMs = 0;
     const next = () => {
-      timer = setTimeout(round, everyMs * slowdown);
+      timer = setTimeout(round, Math.max(everyMs * slowdown, retryMs));
     };
     const round = async () => {
       timer = undefined;
@@ -40,11 +41,13 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
         if (stop.signal.aborted) return;
         if (slowdown > 1) void lookForUpdate();
         slowdown = 1;
+        retryMs = 0;
         setPolled({ value, fault: null });
       } catch (error) {
         if (stop.signal.aborted) return;
         slowdown = Math.min(MAX_SLOWDOWN, slowdown * 2);
         const fault = faultOf(error);
+        retryMs = fault.retryMs ?? 0;
         setPolled((before) => ({ ...before, fault }));
         if (fault.reason === FINAL_REASON) return;
       }

@@ -1,10 +1,11 @@
-// Attending to a physical table: follows its state and sends reports. A report whose response was
-// lost is sent again with its id, so that the server counts it once.
+// Attending to a physical table: follows its state and sends reports. A report is sent until the server
+// answers, as long as the page is open, and always with its id, so that the server counts it once.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { type Signal, signal } from "@preact/signals";
+import { askUntilAnswered } from "../api/asking";
 import { tableApi } from "../api/client";
-import { faultOf, inWords, isPassing } from "../api/faults";
+import { wordsOf } from "../api/faults";
 import { type Following, follow } from "../api/follow";
 import {
   type ReportResponse,
@@ -40,14 +41,12 @@ export interface Attending {
   stop(): void;
 }
 
-/** Attempts to send a report, and the delay between them, times the attempt. */
-const MAX_ATTEMPTS = 5;
-const RETRY_MS = 400;
 const REPORT_ID_BYTES = 16;
 
 /** Starts attending with a table's ticket. */
 export function startAttending(ticket: string): Attending {
   const state = signal<TableState | undefined>(undefined);
+  let stopped = false;
   const apply = (next: TableState | undefined) => {
     const before = state.peek();
     if (next && (before === undefined || next.version > before.version)) state.value = next;
@@ -65,18 +64,23 @@ export function startAttending(ticket: string): Attending {
       reportId: newId(),
       report: { source: ReportSource.ATTENDANT, kind: what },
     };
-    for (let attempt = 1; ; attempt += 1) {
-      try {
-        const response = await tableApi.report(request);
-        apply(response.state);
-        return outcomeOf(response);
-      } catch (thrown) {
-        if (!isPassing(faultOf(thrown)) || attempt >= MAX_ATTEMPTS) return { kind: "fault", words: inWords(thrown) };
-        await new Promise((resolve) => setTimeout(resolve, RETRY_MS * attempt));
-      }
-    }
+    let words = "";
+    const response = await askUntilAnswered(
+      () => tableApi.report(request),
+      () => !stopped,
+      (found) => {
+        words = wordsOf(found);
+      },
+    );
+    if (!response) return { kind: "fault", words };
+    apply(response.state);
+    return outcomeOf(response);
   };
-  return { state, following, report, stop: () => following.stop() };
+  const stop = () => {
+    stopped = true;
+    following.stop();
+  };
+  return { state, following, report, stop };
 }
 
 function outcomeOf({ verdict, voidReports }: ReportResponse): Outcome {

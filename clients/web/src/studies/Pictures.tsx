@@ -3,7 +3,7 @@
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type ComponentChildren, createContext, type JSX } from "preact";
 import { useContext, useEffect, useMemo, useState } from "preact/hooks";
-import { faultOf, isPassing } from "../api/faults";
+import { askUntilAnswered } from "../api/asking";
 import css from "./Formatted.module.css";
 import { formatOf } from "./picture-files";
 
@@ -11,9 +11,6 @@ import { formatOf } from "./picture-files";
 type FindPicture = (name: string, signal: AbortSignal) => Promise<string>;
 
 const Found = createContext<FindPicture>(async () => "");
-
-const SHORTEST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 8_000;
 
 /** Texts inside show the pictures whose files `load` returns. */
 export function WithPictures(props: { load: (name: string) => Promise<Uint8Array>; children: ComponentChildren }) {
@@ -30,19 +27,19 @@ function finding(load: (name: string) => Promise<Uint8Array>): FindPicture {
     const format = formatOf(file);
     return format ? `data:${format};base64,${base64Encode(file)}` : "";
   };
-  return async (name, signal) => {
-    for (let waitMs = SHORTEST_WAIT_MS; ; waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)) {
-      const asking = addresses.get(name) ?? asked(name);
-      addresses.set(name, asking);
-      try {
-        return await asking;
-      } catch (thrown) {
-        if (!isPassing(faultOf(thrown)) || signal.aborted) return "";
-        await new Promise((resolve) => setTimeout(resolve, waitMs));
-        if (addresses.get(name) === asking) addresses.delete(name);
-      }
-    }
+  const addressOf = (name: string) => {
+    const asking = addresses.get(name) ?? asked(name);
+    addresses.set(name, asking);
+    return asking.catch((thrown) => {
+      if (addresses.get(name) === asking) addresses.delete(name);
+      throw thrown;
+    });
   };
+  return async (name, signal) =>
+    (await askUntilAnswered(
+      () => addressOf(name),
+      () => !signal.aborted,
+    )) ?? "";
 }
 
 /** A picture of the study, or its words as long as it is not there. */

@@ -5,6 +5,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { askUntilAnswered } from "../api/asking";
 import type {
   StudyLikert,
   StudyNumber,
@@ -96,18 +97,23 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
 
 /**
  * Saves the answers a moment after they last changed, and at once when the page is hidden; one call at
- * a time. What cannot be saved stays on the page, and is saved with the next change.
+ * a time. While the server cannot be reached they are sent again, unless they change meanwhile.
  */
 function useSaving(send: (answers: ItemAnswer[]) => Promise<void>): (answers: ItemAnswer[]) => void {
   const unsaved = useRef<ItemAnswer[] | undefined>(undefined);
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const busy = useRef(false);
+  const left = useRef(false);
   const flush = async () => {
     clearTimeout(timer.current);
     for (let next = unsaved.current; next && !busy.current; next = unsaved.current) {
+      const answers = next;
       unsaved.current = undefined;
       busy.current = true;
-      await send(next).catch(() => undefined);
+      await askUntilAnswered(
+        () => send(answers),
+        () => !left.current && unsaved.current === undefined,
+      );
       busy.current = false;
     }
   };
@@ -115,6 +121,7 @@ function useSaving(send: (answers: ItemAnswer[]) => Promise<void>): (answers: It
     const hide = () => document.visibilityState === "hidden" && void flush();
     document.addEventListener("visibilitychange", hide);
     return () => {
+      left.current = true;
       clearTimeout(timer.current);
       unsaved.current = undefined;
       document.removeEventListener("visibilitychange", hide);

@@ -2,12 +2,12 @@
 
 import { type Signal, signal } from "@preact/signals";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
-import { roomApi } from "../api/client";
-import { type Fault, faultOf, isPassing, wordsOf } from "../api/faults";
-import { SECRET_HEADER } from "../api/secrets";
+import { askUntilAnswered } from "../api/asking";
+import { type Fault, isPassing, wordsOf } from "../api/faults";
 import { StudyHide, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
 import { type Hideable, leaveOut } from "../hiding";
 import { t } from "../i18n";
+import { roomOfTicket } from "../lobby/room-like";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
@@ -145,29 +145,20 @@ interface StudyTable {
   stop(): void;
 }
 
-const RETRY_MS = 1_000;
-
 /** Requests the room, which only those who have its ticket see, and attaches to the seat. */
 function startStudyTable({ roomId, ticket }: StudyShownGame, title: string): StudyTable {
   const session = signal<Session | undefined>(undefined);
   const fault = signal<Fault | undefined>(undefined);
   let stopped = false;
   const load = async () => {
-    while (!stopped) {
-      try {
-        const { room } = await roomApi.getRoom({ roomId }, { headers: { [SECRET_HEADER]: ticket } });
-        if (stopped || !room) return;
-        session.value = startSession({ ticket }, { ...tableFromRoom(room), roomName: title }, true);
-        return;
-      } catch (thrown) {
-        const found = faultOf(thrown);
-        if (!isPassing(found)) {
-          fault.value = found;
-          return;
-        }
-        await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-      }
-    }
+    const room = await askUntilAnswered(
+      () => roomOfTicket(roomId, ticket),
+      () => !stopped,
+      (found) => {
+        if (!isPassing(found)) fault.value = found;
+      },
+    );
+    if (room && !stopped) session.value = startSession({ ticket }, { ...tableFromRoom(room), roomName: title }, true);
   };
   void load();
   return {

@@ -3,6 +3,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { effect, type Signal, signal } from "@preact/signals";
+import { askUntilAnswered } from "../api/asking";
 import { type Fault, faultOf, isPassing } from "../api/faults";
 import { type Following, follow, type Link } from "../api/follow";
 import {
@@ -65,8 +66,6 @@ export interface Participating {
   stop(): void;
 }
 
-const SHORTEST_WAIT_MS = 500;
-const LONGEST_WAIT_MS = 8_000;
 /** Nothing more can be done here. */
 const ENDING = ["SESSION_SUPERSEDED", "STUDY_FULL", "STUDY_CLOSED"];
 /** The page is behind: the newest view says what to do. */
@@ -132,35 +131,26 @@ export function startParticipating(given: string): Participating {
     leave();
     opened += 1;
     const attempt = opened;
+    const isNewest = () => !stopped && attempt === opened;
     presence.value = "opening";
-    for (
-      let waitMs = SHORTEST_WAIT_MS;
-      !stopped && attempt === opened;
-      waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)
-    ) {
-      try {
-        const answer = await openStudy(secret).catch(joinFirst);
-        if (stopped || attempt !== opened) return;
-        session = answer.session;
-        progress = {
-          step: answer.view?.step ?? -1,
-          reachedAtMs: performance.now() - Number(answer.stepAgeMs),
-          saved: answer.savedAnswers,
-        };
-        view.value = answer.view;
-        forgetDeleted(answer.view);
-        presence.value = "open";
-        link.value = "open";
-        if (session !== "") attend();
-        return;
-      } catch (thrown) {
-        const found = faultOf(thrown);
-        if (stopped || attempt !== opened) return;
-        if (!isPassing(found)) return fail(found);
-        link.value = "lost";
-        await new Promise((resolve) => setTimeout(resolve, waitMs));
-      }
-    }
+    const onFault = (found: Fault) => {
+      if (!isNewest()) return;
+      if (isPassing(found)) link.value = "lost";
+      else fail(found);
+    };
+    const answer = await askUntilAnswered(() => openStudy(secret).catch(joinFirst), isNewest, onFault);
+    if (!answer || !isNewest()) return;
+    session = answer.session;
+    progress = {
+      step: answer.view?.step ?? -1,
+      reachedAtMs: performance.now() - Number(answer.stepAgeMs),
+      saved: answer.savedAnswers,
+    };
+    view.value = answer.view;
+    forgetDeleted(answer.view);
+    presence.value = "open";
+    link.value = "open";
+    if (session !== "") attend();
   };
 
   const attend = () => {
@@ -176,7 +166,7 @@ export function startParticipating(given: string): Participating {
       link.value = stream.link.value;
       const found = stream.fault.value;
       if (stream.link.value !== "failed" || !found) return;
-      // The server has forgotten the session, for example in a restart; the link still counts.
+      // The link still counts.
       if (found.reason === "SESSION_UNKNOWN") queueMicrotask(() => void open());
       else queueMicrotask(() => fail(found));
     });

@@ -3,9 +3,10 @@
 // (tournaments/participation.ts).
 
 import { batch, computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
+import { askUntilAnswered } from "../api/asking";
 import { playApi } from "../api/client";
-import { faultOf, inWords, isPassing } from "../api/faults";
-import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
+import { type Fault, inWords, isPassing, wordsOf } from "../api/faults";
+import { AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import type { Hint, SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
 import type { Gesture } from "./expressions";
 import { applyUpdate, type LiveState, startLive } from "./model/live";
@@ -28,8 +29,7 @@ export type Automatic = "auto_pass" | "planned";
  * counts an answer that it receives twice once.
  */
 const ANSWER_LIMIT_MS = 5_000;
-/** Pauses before an answer is sent again while its decision is open; at once when back online. */
-const SHORTEST_PAUSE_MS = 250;
+/** Longest pause before an answer is sent again while its decision is open. */
 const LONGEST_PAUSE_MS = 2_000;
 
 /** Expressions that wait for a slow connection; further ones would arrive long after they were meant. */
@@ -123,25 +123,21 @@ export function startActing(ticket: string, table: TableState, seat: number | un
   const delivered = async (value: Answer): Promise<string> => {
     // On a new stream none is open until the server has requested it again.
     const mayBeOpen = () => (live.peek().decision?.id ?? value.decisionId) === value.decisionId;
-    for (let pauseMs = SHORTEST_PAUSE_MS; mayBeOpen(); pauseMs = Math.min(2 * pauseMs, LONGEST_PAUSE_MS)) {
-      let result: AnswerResult | undefined;
-      try {
-        const command = { case: "answer" as const, value };
-        ({ result } = await playApi.act({ ticket, command }, { timeoutMs: ANSWER_LIMIT_MS }));
-      } catch (thrown) {
-        if (!mayBeOpen()) return "";
-        if (!isPassing(faultOf(thrown))) return inWords(thrown);
-        trouble.value = inWords(thrown);
-        await pauseOrOnline(pauseMs);
-        continue;
-      }
-      if (!result) return "";
-      apply([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
-      // What closed the decision may be the answer itself, whose response was lost.
-      const isFirst = pauseMs === SHORTEST_PAUSE_MS;
-      return isFirst || result.status === AnswerStatus.INVALID ? answerWords(result) : "";
-    }
-    return "";
+    const command = { case: "answer" as const, value };
+    let isFirst = true;
+    let problem = "";
+    const send = () => playApi.act({ ticket, command }, { timeoutMs: ANSWER_LIMIT_MS });
+    const onFault = (fault: Fault) => {
+      isFirst = false;
+      if (!mayBeOpen()) return;
+      if (isPassing(fault)) trouble.value = wordsOf(fault);
+      else problem = wordsOf(fault);
+    };
+    const result = (await askUntilAnswered(send, mayBeOpen, onFault, LONGEST_PAUSE_MS))?.result;
+    if (!result) return problem;
+    apply([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
+    // What closed the decision may be the answer itself, whose response was lost.
+    return isFirst || result.status === AnswerStatus.INVALID ? answerWords(result) : "";
   };
 
   const askHint = async () => {
@@ -192,14 +188,4 @@ export function startActing(ticket: string, table: TableState, seat: number | un
       void send({ case: "resume", value: {} });
     },
   };
-}
-
-/** Waits, but not longer than until the browser is back online. */
-async function pauseOrOnline(pauseMs: number): Promise<void> {
-  const over = new AbortController();
-  await new Promise<unknown>((resolve) => {
-    setTimeout(resolve, pauseMs);
-    window.addEventListener("online", resolve, { signal: over.signal });
-  });
-  over.abort();
 }
