@@ -2,28 +2,24 @@
 // tournament that only its code shows.
 
 import { create } from "@bufbuild/protobuf";
-import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi, tournamentApi } from "../src/api/client";
-import { RoomState, Visibility } from "../src/gen/chefshat/v1/room_pb";
+import { ParticipantSchema, RoomState, Visibility } from "../src/gen/chefshat/v1/room_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import { GetTournamentResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
-import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { t } from "../src/i18n";
 import { Join } from "../src/lobby/Join";
 import { forgetAll } from "../src/store";
 import { TournamentPage } from "../src/tournaments/TournamentPage";
 import { root } from "./mounted";
+import { AWAY, refused } from "./refusals";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const CODE = "BCDF2345";
 
-const refused = (reason: string) =>
-  new ConnectError("no", Code.PermissionDenied, undefined, [{ desc: ErrorInfoSchema, value: { reason } }]);
-const notReached = () => new ConnectError("away", Code.Unavailable);
 const room = () =>
   create(GetRoomResponseSchema, { room: { roomId: ID, name: "Table one", state: RoomState.WAITING, seats: [{}] } });
 const tournament = () =>
@@ -74,8 +70,8 @@ test("who may try no more codes learns why", async () => {
 });
 
 test("while the server is away, the room that was found stays, and one that was not can be joined", async () => {
-  const rooms = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(notReached()).mockResolvedValueOnce(room());
-  rooms.mockRejectedValue(notReached());
+  const rooms = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(AWAY).mockResolvedValueOnce(room());
+  rooms.mockRejectedValue(AWAY);
   await opened();
   expect(root.querySelector("form")).not.toBeNull();
   expect(root.querySelector('[data-part~="join-room"]')).toBeNull();
@@ -83,17 +79,39 @@ test("while the server is away, the room that was found stays, and one that was 
   expect(root.querySelector('[data-part~="join-room"]')?.textContent).toContain("Table one");
 });
 
+test("a name that a join without an answer may have taken is tried again, any other is not", async () => {
+  const rooms = vi.spyOn(roomApi, "getRoom").mockResolvedValue(room());
+  const join = vi.spyOn(roomApi, "joinRoom").mockRejectedValue(AWAY);
+  await opened();
+  await enter("Ada");
+  expect(join).toHaveBeenCalledTimes(1);
+  const taken = room();
+  taken.room?.seats.push(
+    create(ParticipantSchema, { seat: 1, name: "Ada" }),
+    create(ParticipantSchema, { seat: 2, name: "Bo" }),
+  );
+  rooms.mockResolvedValue(taken);
+  await pass(10_000);
+  await enter("Bo");
+  expect(join).toHaveBeenCalledTimes(1);
+  await enter("Ada");
+  expect(join).toHaveBeenCalledTimes(2);
+});
+
+/** Enters a text in the first field, and sends it. */
+async function enter(text: string) {
+  const input = root.querySelector("input");
+  if (!input) throw new Error("there is no field");
+  input.value = text;
+  await act(() => void input.dispatchEvent(new Event("input", { bubbles: true })));
+  await act(() => root.querySelector<HTMLElement>("form button")?.click());
+  await pass(0);
+}
+
 test("a pasted link is followed, with what it brings, and no code is asked for", async () => {
   const asked = vi.spyOn(roomApi, "getRoom");
   const followed = vi.spyOn(location, "assign").mockReturnValue();
   await act(() => render(<Join route={{ page: "join", code: "" }} />, root));
-  const enter = async (text: string) => {
-    const input = root.querySelector("input");
-    if (!input) throw new Error("there is no field");
-    input.value = text;
-    await act(() => void input.dispatchEvent(new Event("input", { bubbles: true })));
-    await act(() => root.querySelector("button")?.click());
-  };
   await enter(`https://example.org/rooms/${ID}#seat=secret`);
   expect(followed.mock.calls).toEqual([[`/rooms/${ID}#seat=secret`]]);
   await enter("https://example.org/else/where#secret");

@@ -453,7 +453,7 @@ test("what is wrong with a file is said in the language of the page", async () =
 
 test("creating a study stores its owner token", async () => {
   vi.spyOn(studyApi, "createStudy").mockResolvedValue(create(CreateStudyResponseSchema, { study, ownerToken: TOKEN }));
-  expect(await createStudy({ name: "Trust" }, new Uint8Array(32))).toBe(ID);
+  expect(await createStudy({ name: "Trust" })).toBe(ID);
   expect(ownerTokenOf(ID)).toBe(TOKEN);
 });
 

@@ -2,7 +2,7 @@
 // goes straight to it.
 
 import { useEffect, useState } from "preact/hooks";
-import { faultOf, needsToken, wordsOf } from "../api/faults";
+import { faultOf, isPassing, needsToken, wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { languageOf, t } from "../i18n";
@@ -125,7 +125,9 @@ export function NameForm({ code, room }: NameFormProps) {
     return name === "" && kind === ParticipantKind.UNSPECIFIED && reservedFor === ParticipantKind.ROBOT;
   });
   const [asRobot, setAsRobot] = useState(() => new URLSearchParams(location.search).get("as") === "robot");
-  const taken = room?.seats.some((seat) => sameName(nameOf(seat), name)) ?? false;
+  // The name of the last request without an answer, which may have taken the seat with this name.
+  const [unanswered, setUnanswered] = useState("");
+  const taken = unanswered !== name && (room?.seats.some((seat) => sameName(nameOf(seat), name)) ?? false);
   const join = (event: Event) => {
     event.preventDefault();
     setMissing(name.trim() === "");
@@ -133,7 +135,14 @@ export function NameForm({ code, room }: NameFormProps) {
     const pace = paceOf(new URLSearchParams(location.search).get("think") ?? "");
     if (asRobot && pace) storePace(pace);
     const navigate = navigateFromHere();
-    run(async () => navigate(await comeIn(code, name, asRobot)));
+    run(async () => {
+      try {
+        navigate(await comeIn(code, name, asRobot));
+      } catch (thrown) {
+        if (isPassing(faultOf(thrown))) setUnanswered(name);
+        throw thrown;
+      }
+    });
   };
   return (
     <form class={css.form} onSubmit={join}>

@@ -41,27 +41,10 @@ export function NewStudyPage() {
   );
 }
 
-/** The list with one value changed. */
-function changedAt<Value>(list: readonly Value[], index: number, changed: Partial<Value>): readonly Value[] {
-  return list.map((one, at) => (at === index ? { ...one, ...changed } : one));
-}
-
-/** The list without one value. */
-function without<Value>(list: readonly Value[], index: number): readonly Value[] {
-  return list.filter((_, at) => at !== index);
-}
-
-/** An id for a request, so that one repeated after a lost answer creates no second study. */
-function newRequestId(): Uint8Array {
-  return crypto.getRandomValues(new Uint8Array(32));
-}
-
 function FromFile() {
   const words = t().studies.make;
   const [read, setRead] = useState<StudySettings | null>(null);
   const [problem, setProblem] = useState("");
-  // Another file is another study.
-  const [requestId, setRequestId] = useState(newRequestId);
   const { busy, fault, run, reset } = useAttempt();
   const take = async (chosen: readonly File[]) => {
     setRead(null);
@@ -69,7 +52,6 @@ function FromFile() {
     reset();
     const file = chosen.find(({ name }) => hasSettings(name)) ?? chosen[0];
     if (!file) return;
-    setRequestId(newRequestId());
     try {
       const others = chosen.filter((other) => other !== file);
       const contents = others.map(async (other) => [other.name, new Uint8Array(await other.arrayBuffer())] as const);
@@ -80,7 +62,7 @@ function FromFile() {
   };
   const make = (settings: StudySettings) => {
     const navigate = navigateFromHere();
-    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settings, requestId) }));
+    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(settings) }));
   };
   return (
     <section class={`sheet ${css.part}`} data-part="study-file">
@@ -124,7 +106,6 @@ function FromForm() {
   }, [tries]);
   // Dates of which only a part is entered are empty in the form.
   const [unfinished, setUnfinished] = useState<readonly string[]>([]);
-  const [requestId] = useState(newRequestId);
   const { offered } = useOffered();
   const { busy, fault, run } = useAttempt();
   const agents = offered ? agentsFor(offered, false, "") : ["greedy", "random"];
@@ -139,7 +120,7 @@ function FromForm() {
     setUnfinished(unfinished);
     if (unfinished.length > 0 || Object.keys(faultsOf(form)).length > 0) return;
     const navigate = navigateFromHere();
-    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
+    run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form)) }));
   };
   const text = (
     name: "name" | "title" | "factors" | "version" | "external" | "idParameter" | PanelUrl,
@@ -223,9 +204,9 @@ function FromForm() {
           agents={agents}
           hasOtherSeats={hasOtherSeats(form)}
           faults={faults}
-          onChange={(changed) => change({ conditions: changedAt(form.conditions, index, changed) })}
+          onChange={(changed) => change({ conditions: form.conditions.with(index, { ...condition, ...changed }) })}
           onRemove={
-            form.conditions.length > 1 ? () => change({ conditions: without(form.conditions, index) }) : undefined
+            form.conditions.length > 1 ? () => change({ conditions: form.conditions.toSpliced(index, 1) }) : undefined
           }
         />
       ))}
@@ -247,8 +228,8 @@ function FromForm() {
           question={question}
           index={index}
           faults={faults}
-          onChange={(changed) => change({ questions: changedAt(form.questions, index, changed) })}
-          onRemove={() => change({ questions: without(form.questions, index) })}
+          onChange={(changed) => change({ questions: form.questions.with(index, { ...question, ...changed }) })}
+          onRemove={() => change({ questions: form.questions.toSpliced(index, 1) })}
         />
       ))}
       <div>

@@ -2,15 +2,15 @@
 // request, so that the same link leads to the same participation.
 
 import { faultOf } from "../api/faults";
+import { newRequestId, REQUEST_ID_BYTES } from "../api/repeat";
 import { fromHex, hex } from "../hex";
 import { recallObject, remember, remembered } from "../store";
 import { participationApi } from "./client";
 import { thisDevice } from "./device";
 
 const STORED = "study-join.";
-const REQUEST_BYTES = 32;
 /** The request of somebody without an id, until the page is loaded again: others may use this device. */
-const unnamed = crypto.getRandomValues(new Uint8Array(REQUEST_BYTES));
+const unnamed = newRequestId();
 
 /**
  * Takes part by an open link, with the id at the panel that the page's address has in this query
@@ -19,7 +19,7 @@ const unnamed = crypto.getRandomValues(new Uint8Array(REQUEST_BYTES));
 export async function join(openLink: string, idParameter: string): Promise<string> {
   const panelId = idParameter === "" ? "" : (new URLSearchParams(location.search).get(idParameter) ?? "");
   const stored = panelId === "" ? undefined : `${STORED}${openLink}.${panelId}`;
-  const requestId = stored === undefined ? unnamed : (keptRequest(stored) ?? newRequest());
+  const requestId = stored === undefined ? unnamed : (keptRequest(stored) ?? newRequestId());
   const keep = (link: string) => {
     if (stored !== undefined) remember(stored, JSON.stringify({ request: hex(requestId), link }));
   };
@@ -55,13 +55,9 @@ export function forgetJoined(link: string): void {
       remember(name, null);
 }
 
-function newRequest(): Uint8Array<ArrayBuffer> {
-  return crypto.getRandomValues(new Uint8Array(REQUEST_BYTES));
-}
-
 function keptRequest(stored: string): Uint8Array<ArrayBuffer> | undefined {
   const request = fromHex(
     recallObject(stored, (kept) => (typeof kept.request === "string" ? kept.request : null)) ?? "",
   );
-  return request.length === REQUEST_BYTES ? request : undefined;
+  return request.length === REQUEST_ID_BYTES ? request : undefined;
 }

@@ -46,11 +46,8 @@ export async function settingsOfStudy(studyId: string): Promise<StudySettings | 
 }
 
 /** Creates a study and stores its owner token; returns its id. */
-export async function createStudy(
-  settings: MessageInitShape<typeof StudySettingsSchema>,
-  requestId: Uint8Array,
-): Promise<string> {
-  const { study, ownerToken } = await studyApi.createStudy({ settings, requestId });
+export async function createStudy(settings: MessageInitShape<typeof StudySettingsSchema>): Promise<string> {
+  const { study, ownerToken } = await studyApi.createStudy({ settings });
   if (!study) throw new Error("the server did not say which study it is");
   keepOwnerToken(study.studyId, ownerToken);
   return study.studyId;

@@ -100,7 +100,6 @@ export async function replaceByPerson(tournamentId: string, participant: number,
     participant,
     name: name.trim(),
     kind: ParticipantKind.HUMAN,
-    requestId: crypto.getRandomValues(new Uint8Array(32)),
   };
   const { ticket } = await tournamentApi.replaceParticipant(request);
   dropLinksTo(tournamentId, participant);
