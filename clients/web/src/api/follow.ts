@@ -31,6 +31,9 @@ const WATCH_EVERY_MS = 1_000;
 const SHORTEST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 8_000;
 
+/** The time by two clocks: that of the day may be set back, and the other may stand still while a device sleeps. */
+const clocks = () => ({ dayMs: Date.now(), runMs: performance.now() });
+
 /** Asks for heartbeats on the streams of the server, which leaves them out where there are none. */
 export const askHeartbeats: Interceptor = (next) => (request) => {
   if (request.stream) request.header.set("chefshat-heartbeat", String(HEARTBEAT_S));
@@ -65,11 +68,15 @@ export function follow<Message>(
   const fault = signal<Fault | undefined>(undefined);
   let stopped = false;
   let current = new AbortController();
-  let heardAtMs = Date.now();
+  let heard = clocks();
   let wake = () => {};
   let resting = false;
   let restTimer: ReturnType<typeof setTimeout> | undefined;
 
+  const dropIfSilent = () => {
+    const now = clocks();
+    if (Math.max(now.dayMs - heard.dayMs, now.runMs - heard.runMs) > SILENCE_MS) current.abort();
+  };
   const rest = () => {
     resting = true;
     current.abort();
@@ -81,7 +88,7 @@ export function follow<Message>(
       return;
     }
     resting = false;
-    if (Date.now() - heardAtMs > SILENCE_MS) current.abort();
+    dropIfSilent();
     wake();
   };
   /** The connections of the former network are dead, even if nothing has shown it yet. */
@@ -89,9 +96,7 @@ export function follow<Message>(
     current.abort();
     wake();
   };
-  const watchdog = setInterval(() => {
-    if (Date.now() - heardAtMs > SILENCE_MS) current.abort();
-  }, WATCH_EVERY_MS);
+  const watchdog = setInterval(dropIfSilent, WATCH_EVERY_MS);
   document.addEventListener("visibilitychange", revive);
   window.addEventListener("online", reopen);
 
@@ -128,11 +133,11 @@ export function follow<Message>(
       if (stopped) return;
       let retryMs = 0;
       current = new AbortController();
-      heardAtMs = Date.now();
+      heard = clocks();
       try {
         for await (const message of open(current.signal)) {
           if (stopped) return;
-          heardAtMs = Date.now();
+          heard = clocks();
           failures = 0;
           if (link.peek() === "lost") void lookForUpdate();
           link.value = "open";
