@@ -8,7 +8,7 @@ import { ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
 import { en } from "../src/i18n/en";
 import { type Gesture, PHRASES, type Phrase, phraseGesture, phraseOf, shownLabel } from "../src/table/expressions";
 import { Expressions } from "../src/table/view/Tools";
-import { root } from "./mounted";
+import { root, type } from "./mounted";
 
 /** The longest label that the protocol allows, bytes. */
 const MAX_LABEL = 64;
@@ -31,25 +31,46 @@ test.each([
   expect(phraseOf(label)).toEqual(expected);
 });
 
-async function opened(phrases: boolean, chat: boolean): Promise<Gesture[]> {
+const speak = () => act(() => root.querySelector<HTMLElement>(`[title="${en.table.expressions.say}"]`)?.click());
+
+async function opened(phrases: boolean, chat: boolean, arrives = () => true): Promise<Gesture[]> {
   const said: Gesture[] = [];
-  await act(() => render(<Expressions phrases={phrases} chat={chat} onExpress={(it) => said.push(it)} />, root));
-  await act(() => root.querySelector<HTMLElement>(`[title="${en.table.expressions.say}"]`)?.click());
+  const onExpress = async (gesture: Gesture) => {
+    said.push(gesture);
+    return arrives();
+  };
+  await act(() => render(<Expressions phrases={phrases} chat={chat} onExpress={onExpress} />, root));
+  await speak();
   return said;
 }
+
+/** Writes a line and sends it. */
+async function write(text: string) {
+  const line = root.querySelector<HTMLInputElement>("form input");
+  const send = root.querySelector<HTMLButtonElement>("form button");
+  if (!line || !send) throw new Error("there is no line to write");
+  expect(send.disabled).toBe(line.value === "");
+  await type(line, text);
+  await act(() => send.click());
+}
+
+test("words that did not arrive are there again, and others are not", async () => {
+  let isCut = true;
+  const said = await opened(false, true, () => !isCut);
+  const line = () => root.querySelector<HTMLInputElement>("form input")?.value;
+  await write("What a Shift!");
+  await speak();
+  expect([said.length, line()]).toEqual([1, "What a Shift!"]);
+  isCut = false;
+  await write("What a Shift!");
+  await speak();
+  expect([said.length, line()]).toEqual([2, ""]);
+});
 
 test("people write where the room allows it", async () => {
   const said = await opened(true, true);
   expect(root.querySelectorAll("[data-part~=phrases] button")).toHaveLength(Object.keys(PHRASES).length);
-  const line = root.querySelector<HTMLInputElement>("form input");
-  const send = root.querySelector<HTMLButtonElement>("form button");
-  if (!line || !send) throw new Error("there is no line to write");
-  expect(send.disabled).toBe(true);
-  await act(() => {
-    line.value = "  Ciao, è bello! ";
-    line.dispatchEvent(new Event("input", { bubbles: true }));
-  });
-  await act(() => send.click());
+  await write("  Ciao, è bello! ");
   expect(said).toHaveLength(1);
   const [{ label, media = "", source }] = said as [Gesture];
   expect(source).toBe(ExpressionSource.SELF_REPORT);

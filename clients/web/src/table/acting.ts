@@ -63,8 +63,8 @@ export interface Acting {
   answer(action: number, automatic?: Automatic): void;
   /** Asks for a hint for the open decision. */
   askHint(): void;
-  /** Shows an expression to the table, after those shown before it. */
-  express(gesture: Gesture): void;
+  /** Shows an expression to the table, after those shown before it; resolves to whether it was sent. */
+  express(gesture: Gesture): Promise<boolean>;
   /** Takes the seat back from a substitute. */
   resume(): void;
 }
@@ -156,12 +156,14 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     }
   };
 
-  const send = async (command: Parameters<typeof playApi.act>[0]["command"]) => {
-    if (!command) return;
+  /** Sends a command once; returns whether it arrived. */
+  const send = async (command: NonNullable<Parameters<typeof playApi.act>[0]["command"]>) => {
     try {
       await playApi.act({ ticket, command });
+      return true;
     } catch (thrown) {
       trouble.value = inWords(thrown);
+      return false;
     }
   };
 
@@ -175,13 +177,14 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     askHint: () => void askHint(),
     express: (gesture) => {
       trouble.value = "";
-      if (unsent >= MAX_UNSENT) return;
+      if (unsent >= MAX_UNSENT) return Promise.resolve(false);
       unsent += 1;
       // One after the other: of calls made together the second may arrive first.
-      expressed = expressed.then(async () => {
-        await send({ case: "express", value: gesture });
+      const sent = expressed.then(() => send({ case: "express", value: gesture }));
+      expressed = sent.then(() => {
         unsent -= 1;
       });
+      return sent;
     },
     resume: () => {
       trouble.value = "";

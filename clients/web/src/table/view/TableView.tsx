@@ -77,7 +77,8 @@ interface TableViewProps {
   onAnswer?: (action: number, automatic?: Automatic) => void;
   /** The person picked a card or put it back. */
   onPick?: ((card: string, picked: boolean) => void) | undefined;
-  onExpress?: ((gesture: Gesture) => void) | undefined;
+  /** Shows an expression; resolves to whether it was sent. */
+  onExpress?: ((gesture: Gesture) => Promise<boolean>) | undefined;
   /** Whether there are quick phrases beside the expressions. */
   phrases?: boolean;
   /** Whether people may write. */

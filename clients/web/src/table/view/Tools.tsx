@@ -101,7 +101,8 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
 }
 
 interface ExpressionsProps {
-  onExpress: (gesture: Gesture) => void;
+  /** Resolves to whether it was sent. */
+  onExpress: (gesture: Gesture) => Promise<boolean>;
   /** Whether there are quick phrases too. */
   phrases: boolean;
   /** Whether people may write. */
@@ -111,9 +112,15 @@ interface ExpressionsProps {
 export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
   const words = t().table.expressions;
   const [talking, setTalking] = useState(false);
+  const [typed, setTyped] = useState("");
   const say = (gesture: Gesture) => {
     setTalking(false);
-    onExpress(gesture);
+    return onExpress(gesture);
+  };
+  const write = async () => {
+    const sent = await say(lineGesture(typed.trim(), ExpressionSource.SELF_REPORT));
+    // Words that did not arrive are there when the dialog is opened again.
+    if (sent) setTyped((now) => (now === typed ? "" : now));
   };
   return (
     <fieldset class={css.expressions} data-part="expressions" aria-label={words.label}>
@@ -125,7 +132,7 @@ export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
           data-part="tool"
           aria-label={words.words[label]}
           title={words.words[label]}
-          onClick={() => onExpress(gesture(label))}
+          onClick={() => void onExpress(gesture(label))}
         >
           <Face label={label} />
         </button>
@@ -137,11 +144,11 @@ export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
       )}
       {talking && (
         <Dialog title={words.say} onClose={() => setTalking(false)}>
-          {chat && <OwnWords onExpress={say} />}
+          {chat && <OwnWords text={typed} onText={setTyped} onSend={() => void write()} />}
           {phrases && (
             <div class={css.phrases} data-part="phrases">
               {(Object.keys(PHRASES) as Phrase[]).map((phrase) => (
-                <Button key={phrase} onClick={() => say(phraseGesture(phrase))}>
+                <Button key={phrase} onClick={() => void say(phraseGesture(phrase))}>
                   {words.phrases[phrase]}
                 </Button>
               ))}
@@ -154,20 +161,19 @@ export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
 }
 
 /** A line of the person's own words. */
-function OwnWords({ onExpress }: Pick<ExpressionsProps, "onExpress">) {
+function OwnWords(props: { text: string; onText: (text: string) => void; onSend: () => void }) {
   const words = t().table.expressions;
-  const [text, setText] = useState("");
-  const line = text.trim();
+  const isEmpty = props.text.trim() === "";
   return (
     <form
       class={css.ownWords}
       onSubmit={(event) => {
         event.preventDefault();
-        if (line) onExpress(lineGesture(line, ExpressionSource.SELF_REPORT));
+        if (!isEmpty) props.onSend();
       }}
     >
-      <TextField label={words.ownWords} value={text} maxLength={MAX_LINE} onText={setText} />
-      <Button look="main" type="submit" disabled={!line}>
+      <TextField label={words.ownWords} value={props.text} maxLength={MAX_LINE} onText={props.onText} />
+      <Button look="main" type="submit" disabled={isEmpty}>
         {words.sayIt}
       </Button>
     </form>
