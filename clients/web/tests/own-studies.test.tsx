@@ -46,7 +46,7 @@ import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
-import { eventually, root, settle } from "./mounted";
+import { button, eventually, press, root, settle, type } from "./mounted";
 import { refused } from "./refusals";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
@@ -72,12 +72,6 @@ const participants = [
   participant(3, StudyParticipantState.INVITED, []),
 ];
 const changed = vi.fn<(participant: StudyParticipant) => void>();
-const button = (words: string) =>
-  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
-const press = async (words: string) => {
-  await act(() => button(words)?.click());
-  await settle();
-};
 
 test("the form makes the settings of a study, and says what is missing", async () => {
   const form = emptyForm("en");
@@ -286,11 +280,9 @@ test("a number with letters is not taken for an empty field", async () => {
     ({ textContent }) => textContent === t().studies.make.minWidth,
   );
   const width = root.querySelector<HTMLInputElement>(`[id="${label?.htmlFor}"]`);
-  if (!width) throw new Error("there is no field for the width");
-  width.value = "1024px";
-  await act(() => void width.dispatchEvent(new Event("input", { bubbles: true })));
+  await type(width, "1024px");
   await press(t().studies.make.submit);
-  expect(width.getAttribute("aria-invalid")).toBe("true");
+  expect(width?.getAttribute("aria-invalid")).toBe("true");
 });
 
 test("values of enums are written in short, as for the command", async () => {
@@ -328,17 +320,12 @@ test("those of a study with groups may be added together, in whole groups", asyn
   const form = root.querySelector('[data-part="add-participants"]');
   const count = form?.querySelector<HTMLInputElement>('input[inputmode="numeric"]');
   const together = form?.querySelector<HTMLInputElement>('input[type="checkbox"]');
-  const enter = (number: string) =>
-    act(() => {
-      if (count) count.value = number;
-      count?.dispatchEvent(new Event("input", { bubbles: true }));
-    });
   await act(() => together?.click());
-  await enter("3");
+  await type(count, "3");
   await press("Add");
   expect(form?.textContent).toContain("Add a multiple of 2.");
   expect(add).not.toHaveBeenCalled();
-  await enter("4");
+  await type(count, "4");
   add.mockRejectedValueOnce(refused("STUDY_CLOSED"));
   await press("Add");
   expect(form?.textContent).not.toContain("Perhaps they have been added");
@@ -490,11 +477,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   await press("Add");
   expect(add).not.toHaveBeenCalled();
   expect(root.querySelector('[data-part="add-participants"] [role="alert"]')).not.toBeNull();
-  const area = root.querySelector<HTMLTextAreaElement>('[data-part="add-participants"] textarea');
-  await act(() => {
-    if (area) area.value = "P10-P12";
-    area?.dispatchEvent(new Event("input", { bubbles: true }));
-  });
+  await type(root.querySelector('[data-part="add-participants"] textarea'), "P10-P12");
   await press("Add");
   expect(add.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, count: 0, pseudonyms: ["P10", "P11", "P12"] });
 
@@ -502,6 +485,12 @@ test("the page shows progress, adds participants, shows links, and asks before i
   await eventually(() => {
     expect(root.querySelector('[data-part="links"]')?.textContent).toContain(`/study/${link}`);
   });
+  // They stay when somebody joins.
+  const joined = create(StudyParticipantSchema, { number: 4, pseudonym: "P04" });
+  await act(() =>
+    render(<OwnStudy study={study} participants={[...participants, joined]} onChanged={changed} />, root),
+  );
+  expect(root.querySelector('[data-part="links"]')?.textContent).toContain(`/study/${link}`);
 
   // The first row has ended: it can only be deleted.
   await press("Delete data…");
@@ -615,16 +604,10 @@ test("a key of another study is not taken, and one that the server does not know
   });
   await act(() => render(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />, root));
   await eventually(() => expect(button("Use this key")).toBeDefined());
-  const enter = (key: string) =>
-    act(() => {
-      const field = root.querySelector("input");
-      if (field) field.value = key;
-      field?.dispatchEvent(new Event("input", { bubbles: true }));
-    });
-  await enter(OTHER_TOKEN);
+  await type(root.querySelector("input"), OTHER_TOKEN);
   await press("Use this key");
   expect(ownerTokenOf(ID)).toBe(TOKEN);
-  await enter(` ${right} `);
+  await type(root.querySelector("input"), ` ${right} `);
   await press("Use this key");
   expect(ownerTokenOf(ID)).toBe(right);
   await eventually(() => expect(root.textContent).toContain("Trust 1"));

@@ -187,7 +187,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
       {!closed && study.openLink && <OpenLink study={study} />}
       {!closed && <Add study={study} />}
       <Tests study={study} />
-      <Links key={participants.length} studyId={studyId} />
+      <Links studyId={studyId} known={participants.length} />
       <Participants {...{ study, participants, onChanged }} />
       <details class={`sheet ${css.part}`}>
         <summary>{words.showKey}</summary>
@@ -423,7 +423,7 @@ function Tests({ study }: { study: Study }) {
       )}
       {testParticipants > 0 && (
         <>
-          <TestLinks key={testParticipants} studyId={studyId} />
+          <TestLinks studyId={studyId} known={testParticipants} />
           <Export study={study} test />
         </>
       )}
@@ -431,8 +431,14 @@ function Tests({ study }: { study: Study }) {
   );
 }
 
-/** The links of a study that are wanted, once they are requested. */
-function useLinks(studyId: string, isWanted: (link: StudyLink) => boolean) {
+interface LinksProps {
+  studyId: string;
+  /** How many participants there are. */
+  known: number;
+}
+
+/** The links of a study that are wanted, once they are requested; and again for each participant that is added. */
+function useLinks({ studyId, known }: LinksProps, isWanted: (link: StudyLink) => boolean) {
   const [links, setLinks] = useState<StudyLink[] | null>(null);
   const { busy, fault, run } = useAttempt();
   const show = () =>
@@ -440,11 +446,14 @@ function useLinks(studyId: string, isWanted: (link: StudyLink) => boolean) {
       setLinks((await linksOf(studyId)).filter(isWanted));
       return false;
     });
+  useEffect(() => {
+    if (links) show();
+  }, [known]);
   return { links, show, busy, fault };
 }
 
-function TestLinks({ studyId }: { studyId: string }) {
-  const { links, show, busy, fault } = useLinks(studyId, ({ test }) => test);
+function TestLinks(props: LinksProps) {
+  const { links, show, busy, fault } = useLinks(props, ({ test }) => test);
   if (links?.length === 0) return <p class="soft">{t().studies.own.tests.noLinks}</p>;
   return links ? (
     <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link) }))} />
@@ -459,10 +468,10 @@ function TestLinks({ studyId }: { studyId: string }) {
 }
 
 /** The links, requested when asked for: they let anybody take part. */
-function Links({ studyId }: { studyId: string }) {
+function Links(props: LinksProps) {
   const words = t().studies.own.links;
   // Those who joined have theirs; those of test participants are not to be handed out.
-  const { links, show, busy, fault } = useLinks(studyId, ({ joined, test }) => !joined && !test);
+  const { links, show, busy, fault } = useLinks(props, ({ joined, test }) => !joined && !test);
   return (
     <section class={`sheet ${css.part} ${css.links}`} data-part="links">
       <h2>{words.title}</h2>
