@@ -52,13 +52,18 @@ export function decimal(value: number, digits: number): string {
 }
 
 /** The locale of dates: the reader's, if the browser names one for the page's language. */
-export function dateLocale(): string {
+function dateLocale(): string {
   return navigator.languages.find((one) => one.startsWith(language.value)) ?? language.value;
 }
 
 /** A day, from milliseconds since the Unix epoch. */
 export function dateOf(ms: bigint): string {
   return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "long" }).format(Number(ms));
+}
+
+/** A point in time, from milliseconds since the Unix epoch. */
+export function momentOf(ms: bigint, dateStyle: "short" | "medium" = "medium"): string {
+  return new Intl.DateTimeFormat(dateLocale(), { dateStyle, timeStyle: "short" }).format(Number(ms));
 }
 
 /** Chooses the initial language and loads its texts. */

@@ -5,7 +5,7 @@ import { wordsOf } from "../api/faults";
 import { useShown } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
-import { dateLocale, decimal, t } from "../i18n";
+import { decimal, momentOf, t } from "../i18n";
 import { nameOf } from "../lobby/rooms";
 import { KindBadge } from "../parts/KindBadge";
 import { MoreButton } from "../parts/MoreButton";
@@ -131,7 +131,6 @@ function NotRated({ record, seat }: Pick<OwnGame, "record" | "seat">) {
 
 function Games({ games }: { games: readonly OwnGame[] }) {
   const words = t().people.person;
-  const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
   return (
     <table class={css.personGames}>
       <thead>
@@ -146,7 +145,7 @@ function Games({ games }: { games: readonly OwnGame[] }) {
       </thead>
       <tbody>
         {games.map(({ record, seat, place, points, others }) => {
-          const date = dates.format(Number(record.endedAtMs));
+          const date = momentOf(record.endedAtMs);
           return (
             <tr key={record.gameId}>
               <td class="number">{date}</td>

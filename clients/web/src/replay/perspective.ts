@@ -2,7 +2,7 @@
 // spectators did.
 
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
-import type { TableState } from "../table/model/state";
+import { isOver, type TableState } from "../table/model/state";
 import type { Frame } from "./frames";
 
 /** All hands, no hands, or the hand of a seat. */
@@ -30,5 +30,5 @@ export function decidingFor({ open, table }: Frame, perspective: Perspective): n
   if (!open) return undefined;
   if (open.kind === DecisionKind.SPECIAL_ACTION && perspective !== "all" && perspective !== open.seat) return undefined;
   // After the last play of a game nobody decides.
-  return table.phase === "gameOver" || table.phase === "aborted" ? undefined : open.seat;
+  return isOver(table) ? undefined : open.seat;
 }

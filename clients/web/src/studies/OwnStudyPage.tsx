@@ -15,7 +15,7 @@ import {
   type StudyRequiredDevice,
 } from "../gen/chefshat/v1/study_pb";
 import { hex } from "../hex";
-import { dateLocale, t } from "../i18n";
+import { momentOf, t } from "../i18n";
 import { CopyLine, QrCode } from "../lobby/Invite";
 import { MAX_NAME } from "../lobby/room-form";
 import { useAttempt } from "../parts/attempt";
@@ -181,7 +181,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
         <Export study={study} test={false} />
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
-      {deletesAtMs > 0n && <Notice kind="hint">{words.deletes(momentOf(deletesAtMs))}</Notice>}
+      {deletesAtMs > 0n && <Notice kind="hint">{words.deletes(momentOf(deletesAtMs, "short"))}</Notice>}
       {settings?.device && <Notice kind="hint">{deviceWords(settings.device)}</Notice>}
       <Counts study={study} participants={participants} />
       {!closed && study.openLink && <OpenLink study={study} />}
@@ -628,14 +628,9 @@ function Row({ study, participant, onChanged }: RowProps) {
 
 function seenWords({ beganAtMs, endedAtMs, sessions }: StudyParticipant): string {
   const words = t().studies.own.board;
-  if (endedAtMs > 0n) return words.ended(momentOf(endedAtMs));
-  if (beganAtMs > 0n) return `${words.began(momentOf(beganAtMs))} · ${words.sessions(sessions)}`;
+  if (endedAtMs > 0n) return words.ended(momentOf(endedAtMs, "short"));
+  if (beganAtMs > 0n) return `${words.began(momentOf(beganAtMs, "short"))} · ${words.sessions(sessions)}`;
   return "";
-}
-
-/** A point in time, milliseconds since the Unix epoch. */
-function momentOf(ms: bigint): string {
-  return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "short", timeStyle: "short" }).format(Number(ms));
 }
 
 function Export({ study, test }: { study: Study; test: boolean }) {

@@ -12,7 +12,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { inStudy, labelled } from "../table/labels";
-import { tableFromRoom } from "../table/model/state";
+import { isOver, tableFromRoom } from "../table/model/state";
 import { SeatBanner } from "../table/SeatBanner";
 import { Seated } from "../table/Seated";
 import { type Session, startSession } from "../table/session";
@@ -97,7 +97,7 @@ function Table({ session, part, label, game, send }: TableProps) {
     };
   }, [session, send]);
   const { table } = session.live.value;
-  const over = table.phase === "gameOver" || table.phase === "aborted";
+  const over = isOver(table);
   const acting: Session = {
     ...session,
     answer: (action, automatic) => {

@@ -16,7 +16,7 @@ import { ErrorPage } from "../parts/ErrorPage";
 import { Highlights } from "../replay/Highlights";
 import type { PageProps } from "../router";
 import { askRoom } from "./asking";
-import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
+import { isOver, isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
 import { SeatBanner } from "./SeatBanner";
 import { Seated } from "./Seated";
 import { type Session, startSession } from "./session";
@@ -158,8 +158,4 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
 /** Whether an agent can still take the seat. */
 function isForAgent(seat: SeatState): boolean {
   return !isTaken(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT].includes(seat.reservedFor);
-}
-
-function isOver({ phase }: TableState): boolean {
-  return phase === "gameOver" || phase === "aborted";
 }

@@ -4,6 +4,7 @@ import { wordsOf } from "../api/faults";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
+import { isOver } from "./model/state";
 import type { Session } from "./session";
 
 /** The state of the connection, if there is something to say. */
@@ -24,7 +25,7 @@ export function SeatBanner({ session }: { session: Session }) {
   }
   if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
   if (link.value === "lost") return <Notice kind="fault">{words.lost}</Notice>;
-  if (substituted && table.phase !== "gameOver") {
+  if (substituted && !isOver(table)) {
     return (
       <Notice kind="hint">
         {words.substituted}{" "}

@@ -11,6 +11,7 @@ import type { Acting } from "./acting";
 import { useAttention } from "./attention";
 import { useAutoPass } from "./auto-pass";
 import { useAnnounced } from "./following";
+import { isOver } from "./model/state";
 import { Caption } from "./view/Caption";
 import { TableView } from "./view/TableView";
 import { WaitingRoom } from "./view/WaitingRoom";
@@ -35,7 +36,7 @@ export function Seated({ acting, study = false, banner, tools, onward, below, on
   const { table, own, decision, awaited } = acting.live.value;
   const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);
-  useAttention(table.roomId, decision, table.phase !== "gameOver" && table.phase !== "aborted");
+  useAttention(table.roomId, decision, !isOver(table));
   const trouble = acting.trouble.value;
   useEffect(() => {
     if (trouble !== "") announce(trouble);
@@ -71,7 +72,7 @@ export function Seated({ acting, study = false, banner, tools, onward, below, on
       phrases={!study && !wizard}
       chat={table.policy?.chat ?? false}
     >
-      {wizard && table.phase !== "gameOver" && table.phase !== "aborted" && (
+      {wizard && !isOver(table) && (
         <Console
           table={table}
           decision={decision}

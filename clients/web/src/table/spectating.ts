@@ -6,7 +6,7 @@ import { type Following, follow } from "../api/follow";
 import { type AwaitedSeat, awaitedSeat } from "./model/awaited";
 import { applyEvents } from "./model/reduce";
 import { applySnapshot } from "./model/snapshot";
-import { emptyTable, type TableState, tableFromRoom } from "./model/state";
+import { emptyTable, isOver, type TableState, tableFromRoom } from "./model/state";
 
 export interface Spectating {
   readonly table: Signal<TableState>;
@@ -30,7 +30,7 @@ export function startSpectating(roomId: string): Spectating {
       if (room && next.nextSequence === 1) next = tableFromRoom(room);
       if (snapshot) next = applySnapshot(next, snapshot, undefined);
       table.value = applyEvents(next, events);
-      return table.value.phase !== "gameOver" && table.value.phase !== "aborted";
+      return !isOver(table.value);
     },
   );
   return { table, awaited, following, stop: () => following.stop() };

@@ -11,6 +11,7 @@ import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import type { Acting } from "../table/acting";
 import { useAttention } from "../table/attention";
+import { isOver } from "../table/model/state";
 import { Seated } from "../table/Seated";
 import { Tool } from "../table/view/Tools";
 import type { LiveTournament } from "./following";
@@ -149,8 +150,7 @@ function GameBanner({ game }: { game: Acting }) {
 }
 
 function isOverThere(game: Acting): boolean {
-  const { phase } = game.live.value.table;
-  return phase === "gameOver" || phase === "aborted";
+  return isOver(game.live.value.table);
 }
 
 /** Whether the server does not know the seat any more. */

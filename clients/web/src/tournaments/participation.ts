@@ -7,7 +7,7 @@ import { type Following, follow } from "../api/follow";
 import { type Attached, DetachReason, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
 import { type Acting, startActing } from "../table/acting";
 import { askRoom } from "../table/asking";
-import { tableFromRoom } from "../table/model/state";
+import { isOver, tableFromRoom } from "../table/model/state";
 
 /** How the participant is attached. */
 export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
@@ -113,8 +113,7 @@ export function startParticipation(ticket: string): Participation {
 }
 
 function hasEnded({ live }: Acting): boolean {
-  const { table } = live.peek();
-  return table.phase === "gameOver" || table.phase === "aborted";
+  return isOver(live.peek().table);
 }
 
 function presenceAfter({ update }: SeatUpdate, before: Presence): Presence {

@@ -8,7 +8,7 @@ import {
   type TournamentSettings,
   TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
-import { dateLocale, dateOf, t } from "../i18n";
+import { dateOf, momentOf, t } from "../i18n";
 import { clockOfPeople, visibilityWords } from "../lobby/rooms";
 import { StateChip } from "../parts/StateChip";
 import { joinedIn } from "./structure";
@@ -45,7 +45,7 @@ export function inShort(tournament: Tournament): string {
 
 /** When it was created: tournaments may have the same name. */
 export function madeWords({ createdAtMs }: Tournament): string {
-  return t().tournaments.made(moment(createdAtMs));
+  return t().tournaments.made(momentOf(createdAtMs));
 }
 
 /** The day of a tournament that has begun: for which its start was planned, else on which it was created. */
@@ -55,17 +55,11 @@ export function dayWords({ createdAtMs, settings }: Tournament): string {
   return dateOf(startAtMs > createdAtMs && startAtMs <= BigInt(Date.now()) ? startAtMs : createdAtMs);
 }
 
-/** A point in time, milliseconds since the Unix epoch. */
-function moment(ms: bigint): string {
-  const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
-  return dates.format(Number(ms));
-}
-
 /** When it starts, before the start. */
 function startWords({ startAtMs, startWhenJoined }: TournamentSettings): string {
   const words = t().tournaments.play;
   if (startAtMs === 0n) return startWhenJoined ? words.beginsAt(startWhenJoined) : words.beginsByHand;
-  const at = moment(startAtMs);
+  const at = momentOf(startAtMs);
   return startWhenJoined ? words.beginsAtOrOn(startWhenJoined, at) : words.beginsOn(at);
 }
 

@@ -263,6 +263,11 @@ export function withHistory(table: TableState): TableState {
   return { ...table, history: { start: { ...table, history: undefined }, events: [] } };
 }
 
+/** Whether the game has ended, with a result or without. */
+export function isOver({ phase }: Pick<TableState, "phase">): boolean {
+  return phase === "gameOver" || phase === "aborted";
+}
+
 /** Whether a participant has the seat. A study may hide its kind, but not its name. */
 export function isTaken(seat: SeatState): boolean {
   return seat.builtIn !== "" || seat.kind !== ParticipantKind.UNSPECIFIED || seat.name !== "";

@@ -4,7 +4,7 @@
 import { roomApi } from "../../api/client";
 import { usePolled } from "../../api/poll";
 import { t } from "../../i18n";
-import type { TableState } from "../model/state";
+import { isOver, type TableState } from "../model/state";
 
 /** Polling interval, milliseconds. */
 const EVERY_MS = 10_000;
@@ -18,8 +18,8 @@ interface CaptionProps {
 /** The caption of a table. */
 export function Caption({ table, watched = false }: CaptionProps) {
   const words = t().table.watch;
-  const { roomId, roomName, policy, phase } = table;
-  const over = phase === "gameOver" || phase === "aborted";
+  const { roomId, roomName, policy } = table;
+  const over = isOver(table);
   const ask = async (signal: AbortSignal) => {
     if (over || !policy?.spectators) return 0;
     const { room } = await roomApi.getRoom({ roomId }, { signal });

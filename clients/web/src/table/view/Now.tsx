@@ -8,7 +8,7 @@ import { SeatNumber } from "../../parts/SeatNumber";
 import type { AwaitedSeat } from "../model/awaited";
 import type { OpenDecision } from "../model/live";
 import { isOpening, publicRequirement, type Requirement } from "../model/requirement";
-import type { TableState } from "../model/state";
+import { isOver, type TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
 import { AwaitedLine } from "./AwaitedLine";
 import css from "./Now.module.css";
@@ -68,10 +68,6 @@ export function Now(props: NowProps) {
       {!turn && next === undefined && <OwnState table={table} own={own} />}
     </section>
   );
-}
-
-function isOver({ phase }: TableState): boolean {
-  return phase === "gameOver" || phase === "aborted";
 }
 
 /** Who decides, in a few words. */

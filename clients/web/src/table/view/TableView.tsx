@@ -15,7 +15,7 @@ import type { Automatic, GivenHint } from "../acting";
 import type { Gesture } from "../expressions";
 import type { AwaitedSeat } from "../model/awaited";
 import type { OpenDecision } from "../model/live";
-import { awaitsHand, type TableState } from "../model/state";
+import { awaitsHand, isOver, type TableState } from "../model/state";
 import { distinctName, headingWords, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
 import { useDealt } from "./arrivals";
@@ -233,7 +233,7 @@ export function TableView(props: TableViewProps) {
               onRefused={deciding.setRemark}
             />
           </div>
-          {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
+          {props.onAnswer && !isOver(table) && (
             <ActionBar
               table={table}
               own={own}
