@@ -2,7 +2,6 @@
 // what is late blocks nothing.
 
 import { create } from "@bufbuild/protobuf";
-import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { playApi } from "../src/api/client";
 import { AnswerStatus } from "../src/gen/chefshat/v1/decision_pb";
@@ -11,8 +10,7 @@ import { setLanguage } from "../src/i18n";
 import { startActing } from "../src/table/acting";
 import { gesture } from "../src/table/expressions";
 import { emptyTable } from "../src/table/model/state";
-
-const AWAY = new ConnectError("away", Code.Unavailable);
+import { AWAY } from "./refusals";
 
 beforeAll(() => setLanguage("en"));
 beforeEach(() => {

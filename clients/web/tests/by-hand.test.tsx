@@ -21,7 +21,7 @@ import { WhichOne } from "../src/lobby/WhichOne";
 import { forgetAll, remember } from "../src/store";
 import { ManageGames, ManageParticipants, Pause } from "../src/tournaments/ByHand";
 import { hostedTournament, placeLinks, removeParticipant, replaceByPerson } from "../src/tournaments/hosting";
-import { root, settle } from "./mounted";
+import { button, press, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TICKET = "ab".repeat(48);
@@ -43,9 +43,6 @@ const tournament = (names: readonly string[], state = TournamentState.OPEN) =>
   });
 const show = (...names: string[]) =>
   act(() => render(<ManageParticipants tournament={tournament(names)} agents={["greedy", "trained"]} />, root));
-const button = (words: string) =>
-  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
-const press = (words: string) => act(() => button(words)?.click());
 const removing = () =>
   vi.spyOn(tournamentApi, "removeParticipant").mockResolvedValue(create(RemoveParticipantResponseSchema));
 const replacing = () =>

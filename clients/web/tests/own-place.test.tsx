@@ -28,7 +28,7 @@ import {
   linkToPlace,
   placeFromLink,
 } from "../src/tournaments/place";
-import { root, settle } from "./mounted";
+import { button, press, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 
@@ -100,13 +100,6 @@ test.each([
   [90_061_000, "1 day 01:01:01"],
 ])("%i ms are %s", (ms, clock) => expect(clockOf(ms)).toBe(clock));
 
-const button = (words: string) =>
-  [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
-const press = async (words: string) => {
-  expect(button(words), words).toBeDefined();
-  await act(() => button(words)?.click());
-  await settle();
-};
 /** The buttons of Bo's place. */
 async function showPlace(state: TournamentState, games: { game: number; state: TournamentGameState }[] = []) {
   open(BO);

@@ -1,7 +1,6 @@
 // Rooms like another, for playing again.
 
 import { create } from "@bufbuild/protobuf";
-import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
@@ -13,10 +12,10 @@ import {
   JoinRoomResponseSchema,
   SetNextRoomResponseSchema,
 } from "../src/gen/chefshat/v1/room_service_pb";
-import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { playAgain, requestLike } from "../src/lobby/room-like";
 import { createRoom } from "../src/lobby/seat";
 import { forgetAll, remember } from "../src/store";
+import { refused } from "./refusals";
 
 const room = create(RoomSchema, {
   roomId: "like",
@@ -110,10 +109,7 @@ test.each([
 
 test("who is slower to offer a rematch closes the own room and joins the other's", async () => {
   const { described } = await wizardRoom();
-  const refused = new ConnectError("", Code.FailedPrecondition, undefined, [
-    { desc: ErrorInfoSchema, value: { reason: "NEXT_ROOM_SET" } },
-  ]);
-  vi.spyOn(roomApi, "setNextRoom").mockRejectedValue(refused);
+  vi.spyOn(roomApi, "setNextRoom").mockRejectedValue(refused("NEXT_ROOM_SET"));
   const close = vi.spyOn(roomApi, "closeRoom").mockResolvedValue(create(CloseRoomResponseSchema));
   const offered = { ...described, nextJoinCode: "FIRST234" };
   vi.spyOn(roomApi, "getRoom").mockResolvedValue(create(GetRoomResponseSchema, { room: offered }));

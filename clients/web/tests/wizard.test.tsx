@@ -20,7 +20,7 @@ import type { SeatState } from "../src/table/model/state";
 import { Console, isWizard } from "../src/wizard/Console";
 import { MAX_LINES, storedLines, storeLines } from "../src/wizard/lines";
 import { drawn, FIRST_PACE, paceOf, storedPace, storePace } from "../src/wizard/pace";
-import { root } from "./mounted";
+import { root, type } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
 const FACES = 11;
@@ -112,12 +112,7 @@ test("lines are kept on the device", async () => {
   expect(Array.from(long)).toHaveLength(MAX_LINE);
   await show(undefined);
   await act(() => all('[data-action="edit-lines"]')[0]?.click());
-  const editor = root.querySelector("textarea");
-  if (!editor) throw new Error("there is an editor");
-  editor.value = "One\nTwo";
-  await act(() => {
-    editor.dispatchEvent(new Event("input", { bubbles: true }));
-  });
+  await type(root.querySelector("textarea"), "One\nTwo");
   await act(() => all('[data-action="keep-lines"]')[0]?.click());
   expect(all("[data-line]")).toHaveLength(2);
   expect(storedLines()).toEqual(["One", "Two"]);
