@@ -3,7 +3,7 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
 import {
   DetachReason,
@@ -11,7 +11,11 @@ import {
   type SeatUpdateSchema,
 } from "../src/gen/chefshat/v1/play_service_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { setLanguage } from "../src/i18n";
+import { en } from "../src/i18n/en";
+import { refusedWords } from "../src/table/words";
 import { startParticipation } from "../src/tournaments/participation";
+import { AWAY } from "./refusals";
 
 const SEATED = 2 ** 31;
 type Update = MessageInitShape<typeof SeatUpdateSchema>;
@@ -22,6 +26,7 @@ const seated: Update = {
   update: { case: "attached", value: { roomId: "room1", ticket: "t", seat: 0 } },
 };
 
+beforeAll(() => setLanguage("en"));
 beforeEach(() => {
   vi.useFakeTimers();
 });
@@ -43,15 +48,13 @@ function streaming(said: readonly (readonly [atMs: number, update: Update])[]) {
   });
 }
 
-const away = new ConnectError("away", Code.Unavailable);
-
 test("the request of a room is repeated until it succeeds, on one stream", async () => {
   const watch = streaming([
     [0, entered],
     [0, seated],
   ]);
   const room = create(GetRoomResponseSchema, { room: { roomId: "room1" } });
-  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(away).mockRejectedValueOnce(away);
+  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(AWAY).mockRejectedValueOnce(AWAY);
   ask.mockResolvedValue(room);
   const part = startParticipation("ticket");
   await vi.advanceTimersByTimeAsync(10_000);
@@ -67,7 +70,7 @@ test("a superseded page stops its requests and does not take the place back", as
     [0, seated],
     [5_000, superseded],
   ]);
-  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(away);
+  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(AWAY);
   const part = startParticipation("ticket");
   await vi.advanceTimersByTimeAsync(5_000);
   expect(part.presence.value).toBe("superseded");
@@ -90,7 +93,7 @@ test("after a lost connection the seat is attached again, also if its game has e
       yield create(PlayServiceWatchResponseSchema, { updates: [update] });
       await new Promise((resolve) => setTimeout(resolve, 10));
     }
-    if (streams === 1) throw away;
+    if (streams === 1) throw AWAY;
     await new Promise(() => {});
   });
   const part = startParticipation("ticket");
@@ -112,5 +115,14 @@ test("the request of a room that is gone is not repeated", async () => {
   await vi.advanceTimersByTimeAsync(10_000);
   expect(ask).toHaveBeenCalledTimes(1);
   expect(part.game.value).toBeUndefined();
+  part.stop();
+});
+
+test("a refused place says why", async () => {
+  streaming([[0, { handle: 0, update: { case: "refused", value: { reason: "OUT_OF_SCOPE" } } }]]);
+  const part = startParticipation("ticket");
+  await vi.advanceTimersByTimeAsync(0);
+  expect([part.presence.value, part.refusal.value?.reason]).toEqual(["refused", "OUT_OF_SCOPE"]);
+  expect(refusedWords({ reason: "OUT_OF_SCOPE", message: "" })).toBe(en.faults.byReason.OUT_OF_SCOPE);
   part.stop();
 });

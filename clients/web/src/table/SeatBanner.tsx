@@ -6,6 +6,7 @@ import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { isOver } from "./model/state";
 import type { Session } from "./session";
+import { refusedWords } from "./words";
 
 /** The state of the connection, if there is something to say. */
 export function SeatBanner({ session }: { session: Session }) {
@@ -19,10 +20,7 @@ export function SeatBanner({ session }: { session: Session }) {
       </Notice>
     );
   }
-  if (attachment.kind === "refused") {
-    const own = (t().faults.byReason as Record<string, string>)[attachment.reason];
-    return <Notice kind="fault">{own ?? `${words.refused} ${attachment.message}`}</Notice>;
-  }
+  if (attachment.kind === "refused") return <Notice kind="fault">{refusedWords(attachment)}</Notice>;
   if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
   if (link.value === "lost") return <Notice kind="fault">{words.lost}</Notice>;
   if (substituted && !isOver(table)) {

@@ -208,6 +208,12 @@ export function reasonWords(reason: Reason): string {
   }
 }
 
+/** Why the server refused a seat or a place: the page's own sentence, or the server's. */
+export function refusedWords({ reason, message }: { readonly reason: string; readonly message: string }): string {
+  const own = (t().faults.byReason as Record<string, string>)[reason];
+  return own ?? `${t().table.link.refused} ${message}`;
+}
+
 /** The state of the game, for the heading. */
 export function headingWords(table: TableState): string {
   const words = t().table.heading;

@@ -14,6 +14,7 @@ import { useAttention } from "../table/attention";
 import { isOver } from "../table/model/state";
 import { Seated } from "../table/Seated";
 import { Tool } from "../table/view/Tools";
+import { refusedWords } from "../table/words";
 import type { LiveTournament } from "./following";
 import { OwnPlace } from "./OwnPlace";
 import { type Participation as Part, startParticipation } from "./participation";
@@ -124,7 +125,8 @@ function Banner({ part }: { part: Part }) {
   const { link, fault } = part.following.value;
   const failed = link.value === "failed" && fault.value;
   if (failed) return <Notice kind="fault">{wordsOf(failed)}</Notice>;
-  if (part.presence.value === "refused") return <Notice kind="fault">{t().faults.byReason.TICKET_UNKNOWN}</Notice>;
+  const refusal = part.refusal.value;
+  if (refusal) return <Notice kind="fault">{refusedWords(refusal)}</Notice>;
   if (part.presence.value === "superseded") {
     return (
       <Notice kind="hint">

@@ -4,7 +4,7 @@
 import { batch, type Signal, signal } from "@preact/signals";
 import { playApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
-import { type Attached, DetachReason, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
+import { type Attached, DetachReason, type Refused, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
 import { type Acting, startActing } from "../table/acting";
 import { askRoom } from "../table/asking";
 import { isOver, tableFromRoom } from "../table/model/state";
@@ -14,6 +14,8 @@ export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
 
 export interface Participation {
   readonly presence: Signal<Presence>;
+  /** Why the server refused the place; undefined if it did not. */
+  readonly refusal: Signal<Refused | undefined>;
   readonly following: Signal<Following>;
   /** The newest game; undefined before the first. */
   readonly game: Signal<Acting | undefined>;
@@ -32,6 +34,7 @@ interface Seated {
 /** Takes part with a participant's ticket. */
 export function startParticipation(ticket: string): Participation {
   const presence = signal<Presence>("coming");
+  const refusal = signal<Refused | undefined>(undefined);
   const game = signal<Acting | undefined>(undefined);
   let stopped = false;
   /** By room: after a reconnect a seat has another handle, but the same table. */
@@ -85,6 +88,7 @@ export function startParticipation(ticket: string): Participation {
     const receive = (update: SeatUpdate) => {
       if (update.handle === own) {
         presence.value = presenceAfter(update, presence.peek());
+        if (update.update.case === "refused") refusal.value = update.update.value;
         return;
       }
       if (update.update.case === "attached") handles.set(update.handle, seat(update.update.value));
@@ -109,7 +113,7 @@ export function startParticipation(ticket: string): Participation {
     stopped = true;
     following.peek().stop();
   };
-  return { presence, following, game, takeBack: reattach, stop };
+  return { presence, refusal, following, game, takeBack: reattach, stop };
 }
 
 function hasEnded({ live }: Acting): boolean {
