@@ -5,12 +5,12 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
 import { type GameEvent, GameEventSchema } from "../gen/chefshat/v1/event_pb";
-import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
+import { ParticipantKind, ParticipantSchema } from "../gen/chefshat/v1/room_pb";
 import { Role } from "../gen/chefshat/v1/rules_pb";
 import type { Texts } from "../i18n/en";
 import { type Move, moveOf } from "../table/model/actions";
 import { cardsFromNumbers } from "../table/model/cards";
-import { emptyTable, type SeatState, type TableState } from "../table/model/state";
+import { emptyTable, type SeatState, seatFromParticipant, type TableState } from "../table/model/state";
 
 type Kind = NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>;
 
@@ -133,24 +133,9 @@ export const LESSONS: readonly Lesson[] = [
 /** The table before the first lesson. */
 export function firstTable(you: string): TableState {
   const seat = (number: number, name: string, kind: ParticipantKind): SeatState => ({
-    seat: number,
-    name,
-    nameFingerprint: "",
-    kind,
-    reservedFor: kind,
-    builtIn: "",
-    connected: true,
-    atTable: false,
-    substitute: "",
-    role: Role.UNSPECIFIED,
-    points: 0,
+    ...seatFromParticipant(create(ParticipantSchema, { seat: number, name, kind, reservedFor: kind, connected: true })),
     cardsLeft: HAND.length,
     hand: number === OWN ? cardsFromNumbers(HAND, true, FACES) : undefined,
-    passed: false,
-    place: 0,
-    lastMove: undefined,
-    received: [],
-    expression: undefined,
   });
   const seats = [
     seat(OWN, you, ParticipantKind.HUMAN),
