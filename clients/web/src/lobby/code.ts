@@ -3,7 +3,7 @@
 import { roomApi, tournamentApi } from "../api/client";
 import { faultOf } from "../api/faults";
 import type { Room } from "../gen/chefshat/v1/room_pb";
-import { canonical, saidRoom } from "./seat";
+import { canonical, requiredRoom } from "./seat";
 
 /** What a code belongs to. */
 export type Found =
@@ -15,7 +15,7 @@ export async function lookUp(code: string, signal?: AbortSignal): Promise<Found>
   const call = signal && { signal };
   const asked = { joinCode: canonical(code) };
   try {
-    return { kind: "room", room: saidRoom((await roomApi.getRoom(asked, call)).room) };
+    return { kind: "room", room: requiredRoom((await roomApi.getRoom(asked, call)).room) };
   } catch (thrown) {
     if (faultOf(thrown).reason !== "JOIN_CODE_WRONG") throw thrown;
   }

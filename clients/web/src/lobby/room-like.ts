@@ -8,7 +8,7 @@ import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySch
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { NO_KEY, nameKey } from "../name-key";
 import { navigateFromHere, type Route } from "../router";
-import { closeRoom, createRoom, type HeldSeat, hostedRoom, saidRoom, takeSeat } from "./seat";
+import { closeRoom, createRoom, type HeldSeat, hostedRoom, requiredRoom, takeSeat } from "./seat";
 
 /** The request for a room with the rules, the policy and the agents of another. */
 export function requestLike(room: Room): MessageInitShape<typeof CreateRoomRequestSchema> {
@@ -60,7 +60,7 @@ export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat
 export async function roomOfTicket(roomId: string, ticket: string, signal?: AbortSignal): Promise<Room> {
   const headers = { [SECRET_HEADER]: ticket };
   const { room } = await roomApi.getRoom({ roomId }, { headers, ...(signal && { signal }) });
-  return saidRoom(room);
+  return requiredRoom(room);
 }
 
 /** Takes the same seat in the room in which the participants of a room play again, and navigates to it. */

@@ -107,7 +107,7 @@ export async function takeSeat(
     nameKey: key,
     ...(seat === undefined ? {} : { seat }),
   });
-  const room = saidRoom(joined.room);
+  const room = requiredRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
   remember(SEAT + room.roomId, JSON.stringify(held));
   keepSecret(held.ticket, room.policy, room.gameId);
@@ -122,7 +122,7 @@ export async function createRoom(
   request: MessageInitShape<typeof CreateRoomRequestSchema>,
 ): Promise<{ room: Room; joinCode: string }> {
   const made = await roomApi.createRoom(request);
-  const room = saidRoom(made.room);
+  const room = requiredRoom(made.room);
   const wizards = (request.seats ?? []).flatMap(({ filledBy }, seat) => (filledBy?.case === "wizard" ? [seat] : []));
   const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken, wizards };
   remember(`hosted.${room.roomId}`, JSON.stringify(hosted));
@@ -165,8 +165,8 @@ export function invitation(code: string): string {
   return `${location.origin}/join/${canonical(code)}`;
 }
 
-/** The room of a response. */
-export function saidRoom(room: Room | undefined): Room {
+/** The room of a response, which always has one. */
+export function requiredRoom(room: Room | undefined): Room {
   if (!room) throw new Error("the server did not say which room it is");
   return room;
 }

@@ -63,7 +63,7 @@ export function StudyGame({ game, title, traces, part }: StudyGameProps) {
       <section class="sheet stack" data-part="study-game">
         <StageTitle>{label}</StageTitle>
         {game.ended ? (
-          <Onward part={part} />
+          <ContinueStudy part={part} />
         ) : fault ? (
           <Notice kind="fault">{wordsOf(fault)}</Notice>
         ) : (
@@ -112,7 +112,7 @@ function Table({ session, part, label, game, send }: TableProps) {
       {over && !game.ended && <Notice kind="hint">{words.ending}</Notice>}
       {game.ended && (
         <Notice kind="good">
-          <Onward part={part} />
+          <ContinueStudy part={part} />
         </Notice>
       )}
     </>
@@ -125,7 +125,7 @@ function Table({ session, part, label, game, send }: TableProps) {
 }
 
 /** The game is over: continues with the study. */
-function Onward({ part }: { part: Participating }) {
+function ContinueStudy({ part }: { part: Participating }) {
   const words = t().studies;
   const { busy, fault, run } = useAttempt();
   return (

@@ -137,7 +137,7 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
             </>
           )
         }
-        onward={
+        nextStep={
           <>
             <Highlights table={table} own={own} />
             <Again roomId={roomId} others={others} />

@@ -24,7 +24,7 @@ interface SeatedProps {
   /** Additional tools of the table. */
   tools?: ComponentChildren;
   /** The next step after the game. */
-  onward?: ComponentChildren;
+  nextStep?: ComponentChildren;
   /** The person picked a card or put it back; its name is the face, or J for a joker. */
   onPick?: (card: string, picked: boolean) => void;
   /** Shown below the seats while the room waits. */
@@ -32,7 +32,7 @@ interface SeatedProps {
 }
 
 /** The table from a seat. */
-export function Seated({ acting, study = false, banner, tools, onward, below, onPick }: SeatedProps) {
+export function Seated({ acting, study = false, banner, tools, nextStep, below, onPick }: SeatedProps) {
   const { table, own, decision, awaited } = acting.live.value;
   const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);
@@ -60,7 +60,7 @@ export function Seated({ acting, study = false, banner, tools, onward, below, on
       trouble={trouble}
       banner={banner}
       tools={tools}
-      onward={onward}
+      nextStep={nextStep}
       caption={<Caption table={table} />}
       hint={acting.hint.value}
       plans={!study && !wizard && isOn("plans")}

@@ -66,7 +66,7 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
             </Tool>
           )
         }
-        onward={
+        nextStep={
           <Button look="main" onClick={() => setLeft(game)}>
             {t().tournaments.part.back}
           </Button>

@@ -53,9 +53,9 @@ const MAX_PAGES = 6;
  */
 const SOONEST_MS = 4_000;
 /** Interval of these requests without changes, milliseconds. */
-const SELDOM_MS = 60_000;
+const QUIET_MS = 60_000;
 /** And when the tournament is over, since nothing changes any more. */
-const HARDLY_MS = 3_600_000;
+const ENDED_MS = 3_600_000;
 
 /** Most games shown. */
 export const MAX_GAMES = PAGE_SIZE * MAX_PAGES;
@@ -78,7 +78,7 @@ export function useConfidence({ tournament }: LiveTournament): readonly OrderCon
 }
 
 function quietMs(tournament: Tournament): number {
-  return isEnded(tournament) ? HARDLY_MS : SELDOM_MS;
+  return isEnded(tournament) ? ENDED_MS : QUIET_MS;
 }
 
 /**

@@ -26,7 +26,7 @@ interface ResultProps {
    */
   links?: boolean;
   /** The next step, before all links. */
-  onward?: ComponentChildren;
+  nextStep?: ComponentChildren;
   /**
    * Whether the reader plays on: then the result of a Shift stays until it is closed. Otherwise it
    * goes with the next Shift's first turn.
@@ -37,11 +37,11 @@ interface ResultProps {
 }
 
 /** The result to show: the game's once it is over, otherwise the last Shift's. */
-export function Result({ table, own, links = true, onward, playing = false, acted = false }: ResultProps) {
+export function Result({ table, own, links = true, nextStep, playing = false, acted = false }: ResultProps) {
   const result = table.results.at(-1);
   const { closed, close } = useClosing(table, acted);
   const reader = links ? own : undefined;
-  const ways = links && <Ways table={table} onward={onward} />;
+  const ways = links && <Ways table={table} nextStep={nextStep} />;
   if (table.phase === "gameOver") return <GameResult table={table} own={reader} profiles={!links} ways={ways} />;
   if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
   if (!result || (playing ? closed : table.phase === "pizza")) return null;
@@ -67,19 +67,19 @@ function useClosing(table: TableState, acted: boolean) {
 }
 
 /** The main step, and links. An aborted game has no replay. */
-function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
+function Ways({ table, nextStep }: Pick<ResultProps, "table" | "nextStep">) {
   const words = t().table.result;
   const ended = table.phase === "gameOver";
   return (
     <div class={css.ways} data-part="result-ways">
-      {onward}
+      {nextStep}
       <span class={css.links} data-part="result-links">
         {ended && (
-          <ButtonLink href={`/replay/${table.gameId}`} look={onward ? "plain" : "main"}>
+          <ButtonLink href={`/replay/${table.gameId}`} look={nextStep ? "plain" : "main"}>
             {words.replay}
           </ButtonLink>
         )}
-        <ButtonLink href="/" look={onward || ended ? "plain" : "main"}>
+        <ButtonLink href="/" look={nextStep || ended ? "plain" : "main"}>
           {words.lobby}
         </ButtonLink>
       </span>

@@ -61,7 +61,7 @@ interface TableViewProps {
   /** Name of the room or record. */
   caption?: ComponentChildren;
   /** The next step after the game, before the links. */
-  onward?: ComponentChildren;
+  nextStep?: ComponentChildren;
   /** Additional tools of the table. */
   tools?: ComponentChildren;
   /** Below the table: the controls of a replay. */
@@ -164,7 +164,7 @@ export function TableView(props: TableViewProps) {
             table={table}
             own={own}
             links={!props.replayed}
-            onward={props.onward}
+            nextStep={props.nextStep}
             playing={own !== undefined && !props.replayed && !props.untimed}
             acted={
               // The first turn of a Shift is open before its first pizza begins.
