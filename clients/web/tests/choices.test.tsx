@@ -9,13 +9,16 @@ import { afterEach, expect, test, vi } from "vitest";
 import { analysisApi, recordApi } from "../src/api/client";
 import { EvaluateResponseSchema } from "../src/gen/chefshat/v1/analysis_service_pb";
 import { GetRecordResponseSchema } from "../src/gen/chefshat/v1/record_service_pb";
+import { t } from "../src/i18n";
 import { choices, compared, costliest, estimatedChoices, finest } from "../src/replay/choices";
 import { filmOf } from "../src/replay/frames";
 import { Graph } from "../src/replay/Graph";
 import { Highlights } from "../src/replay/Highlights";
+import { useFilm } from "../src/replay/hooks";
 import { legalActions } from "../src/table/model/actions";
-import { root, settle } from "./mounted";
+import { eventually, root, settle } from "./mounted";
 import { recorded } from "./record";
+import { AWAY, refused } from "./refusals";
 
 afterEach(() => vi.restoreAllMocks());
 
@@ -182,7 +185,7 @@ test("a game of which nothing can be estimated is not called one without a mista
 
 test("what the server may soon answer is asked again", async () => {
   vi.useFakeTimers({ toFake: ["setTimeout"], shouldAdvanceTime: true, advanceTimeDelta: 500 });
-  const evaluate = refuses({ 2: new ConnectError("away", Code.Unavailable) });
+  const evaluate = refuses({ 2: AWAY });
   const found: unknown[] = [];
   for await (const choice of estimatedChoices("g", ALL.slice(0, 3), new AbortController().signal)) found.push(choice);
   vi.useRealTimers();
@@ -216,4 +219,27 @@ test("at the end of a game a player asks for the best and the costliest own deci
     [best, worst].map((choice) => `/replay/g?decision=${(choice?.decisions ?? 0) + 1}`),
   );
   expect(root.textContent).toMatch(/Your best decision, in Shift 1: .+ \(better than .+ by 1\.5 points\)/);
+});
+
+test("a record is read again while the server is away, from its beginning, and not if it has none", async () => {
+  const lines = recorded("fixed");
+  const reads = vi.spyOn(recordApi, "getRecord").mockImplementation(async function* ({ gameId }) {
+    yield create(GetRecordResponseSchema, { lines: lines.slice(0, 9) });
+    if (gameId !== "g") throw refused("GAME_UNKNOWN", Code.NotFound);
+    if (reads.mock.calls.length === 1) throw AWAY;
+    yield create(GetRecordResponseSchema, { lines: lines.slice(9) });
+  });
+  const seen: string[] = [];
+  function Page({ gameId }: { gameId: string }) {
+    const { film, fault } = useFilm(gameId);
+    seen.push(fault || String(film?.length));
+    return null;
+  }
+  await act(() => render(<Page gameId="g" />, root));
+  await eventually(() => expect(seen.at(-1)).toBe(String(FILM.length)));
+  expect(seen).toContain(t().faults.notReached);
+  await act(() => render(<Page key="other" gameId="other" />, root));
+  await eventually(() => expect(seen.at(-1)).not.toBe(String(FILM.length)));
+  await settle();
+  expect(reads).toHaveBeenCalledTimes(3);
 });

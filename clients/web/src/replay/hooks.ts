@@ -2,26 +2,30 @@
 // worth.
 
 import { useEffect, useState } from "preact/hooks";
+import { askUntilAnswered } from "../api/asking";
 import { recordApi } from "../api/client";
-import { inWords } from "../api/faults";
+import { inWords, wordsOf } from "../api/faults";
 import type { RecordLine } from "../gen/chefshat/v1/record_pb";
 import { type Choice, type EstimatedChoice, estimatedChoices } from "./choices";
 import { type Film, filmOf } from "./frames";
 
-/** Reads a record; the film is undefined until all of it is there. */
+/** Reads a record, also after the server was away; the film is undefined until all of it is there. */
 export function useFilm(gameId: string) {
   const [film, setFilm] = useState<Film | undefined>(undefined);
   const [fault, setFault] = useState("");
   useEffect(() => {
     const leaving = new AbortController();
-    const load = async () => {
+    const isWanted = () => !leaving.signal.aborted;
+    const read = async () => {
       const lines: RecordLine[] = [];
-      try {
-        for await (const part of recordApi.getRecord({ gameId }, { signal: leaving.signal })) lines.push(...part.lines);
-        setFilm(filmOf(lines));
-      } catch (thrown) {
-        if (!leaving.signal.aborted) setFault(inWords(thrown));
-      }
+      for await (const part of recordApi.getRecord({ gameId }, { signal: leaving.signal })) lines.push(...part.lines);
+      return lines;
+    };
+    const load = async () => {
+      const lines = await askUntilAnswered(read, isWanted, (found) => isWanted() && setFault(wordsOf(found)));
+      if (!lines || !isWanted()) return;
+      setFault("");
+      setFilm(() => filmOf(lines));
     };
     void load();
     return () => leaving.abort();
