@@ -41,7 +41,7 @@ import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
 import { OwnStudy, OwnStudyPage } from "../src/studies/OwnStudyPage";
-import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
+import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf, ownStudies } from "../src/studies/owning";
 import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files";
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
@@ -524,6 +524,21 @@ test("a study is deleted after a confirmation, and this device forgets its key",
   const list = vi.spyOn(studyApi, "listStudies").mockResolvedValue(create(ListStudiesResponseSchema));
   await act(() => render(<StudiesPage />, root));
   expect(list.mock.calls[0]?.[0]).toEqual({ ownerTokens: [OTHER_TOKEN] });
+});
+
+test("all studies of this device are listed, however many, newest first", async () => {
+  const ids = Array.from({ length: 150 }, (_, index) => index.toString(16).padStart(32, "0"));
+  for (const id of ids) keepOwnerToken(id, `${id}${"ab".repeat(32)}`);
+  vi.spyOn(studyApi, "listStudies").mockImplementation(async ({ ownerTokens = [] }) => {
+    expect(ownerTokens.length).toBeLessThanOrEqual(100);
+    const studies = ownerTokens.map((token) => ({
+      studyId: token.slice(0, 32),
+      createdAtMs: BigInt(Number.parseInt(token.slice(0, 32), 16)),
+    }));
+    return create(ListStudiesResponseSchema, { studies });
+  });
+  const listed = await ownStudies(new AbortController().signal);
+  expect(listed.map(({ studyId }) => studyId)).toEqual(ids.toReversed());
 });
 
 test("participants in the middle of a study are removed only after the server has refused", async () => {

@@ -36,8 +36,16 @@ export function keepOwnerToken(studyId: string, ownerToken: string): void {
 /** The studies whose owner tokens this device has, newest first. */
 export async function ownStudies(signal: AbortSignal): Promise<Study[]> {
   const ids = [...remembered().keys()].flatMap((key) => (key.startsWith(STORED) ? key.slice(STORED.length) : []));
-  const ownerTokens = ids.flatMap((id) => ownerTokenOf(id) ?? []).slice(0, MAX_TOKENS);
-  return (await studyApi.listStudies({ ownerTokens }, { signal })).studies;
+  const all = ids.flatMap((id) => ownerTokenOf(id) ?? []);
+  const calls = Array.from({ length: Math.max(1, Math.ceil(all.length / MAX_TOKENS)) }, (_, call) => {
+    const ownerTokens = all.slice(call * MAX_TOKENS, (call + 1) * MAX_TOKENS);
+    return studyApi.listStudies({ ownerTokens }, { signal });
+  });
+  // The operator gets all studies with each call.
+  const found = new Map(
+    (await Promise.all(calls)).flatMap(({ studies }) => studies.map((study) => [study.studyId, study])),
+  );
+  return [...found.values()].sort((one, other) => Number(other.createdAtMs - one.createdAtMs));
 }
 
 /** The settings of a study, with its pictures. */
