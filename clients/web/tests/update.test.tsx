@@ -54,6 +54,23 @@ test("after a failure it is looked for again, and once found no longer", async (
   expect(ask).toHaveBeenCalledTimes(2);
 });
 
+test("a document that never comes does not keep it from being looked for again", async () => {
+  const late = new AbortController();
+  vi.spyOn(AbortSignal, "timeout").mockReturnValueOnce(late.signal);
+  ask.mockImplementationOnce(
+    (_, init) =>
+      new Promise((_, reject) => {
+        init?.signal?.addEventListener("abort", () => reject(new TypeError("too late")));
+      }),
+  );
+  ask.mockImplementation(async () => documentOf("/assets/index-new.js"));
+  const first = lookForUpdate();
+  late.abort();
+  await first;
+  await lookForUpdate();
+  expect(outdated.value).toBe(true);
+});
+
 test("a stream that is lost and back, a page that is seen again, and time look for it", async () => {
   ask.mockImplementation(async () => documentOf("/assets/index-old.js"));
   const streams = [["a"], ["b", "end"]];

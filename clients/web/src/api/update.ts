@@ -13,6 +13,14 @@ const SCRIPT = /<script type="module"[^>]* src="(\/assets\/[^"]+)"/;
 /** How often it is looked for while the page is seen, milliseconds. */
 const EVERY_MS = 300_000;
 
+/** How long the server's document is waited for, milliseconds: a dead connection may not say that it is. */
+const LIMIT_MS = 15_000;
+
+/** Requests the server's document. */
+function serversDocument(method: "GET" | "HEAD"): Promise<Response> {
+  return fetch("/", { method, cache: "no-store", signal: AbortSignal.timeout(LIMIT_MS) });
+}
+
 let looking = false;
 
 /** Requests the server's document, and compares its script with that of the open page. */
@@ -21,7 +29,7 @@ export async function lookForUpdate(): Promise<void> {
   if (!own || looking || outdated.peek()) return;
   looking = true;
   try {
-    const answer = await fetch("/", { cache: "no-store" });
+    const answer = await serversDocument("GET");
     // What answers in between, such as a hotspot's sign-in page, has no such script.
     const [, script] = SCRIPT.exec(answer.ok ? await answer.text() : "") ?? [];
     outdated.value = script !== undefined && script !== own;
@@ -56,8 +64,9 @@ const ONCE_IN_MS = 60_000;
 export async function reloadsForNewVersion(): Promise<boolean> {
   try {
     const before = Number(sessionStorage.getItem(RELOADED));
-    if (Date.now() - before < ONCE_IN_MS) return false;
-    const { ok } = await fetch("/", { method: "HEAD", cache: "no-store" });
+    // The clock may have been set back.
+    if (Math.abs(Date.now() - before) < ONCE_IN_MS) return false;
+    const { ok } = await serversDocument("HEAD");
     if (!ok) return false;
     sessionStorage.setItem(RELOADED, String(Date.now()));
   } catch {
