@@ -667,3 +667,18 @@ test("the data are one ZIP with the files of the server", async () => {
   const name = new TextDecoder().decode(bytes.slice(local + 30, local + 30 + view.getUint16(local + 26, true)));
   expect(name).toBe("records/ä.jsonl");
 });
+
+test("a ZIP has more files than its end can count", async () => {
+  const count = 65_536;
+  const files = new Map(Array.from({ length: count }, (_, file) => [`${file}`, []]));
+  const bytes = new Uint8Array(await zipped(files).arrayBuffer());
+  const view = new DataView(bytes.buffer);
+  const end = bytes.length - 22;
+  expect(view.getUint16(end + 10, true)).toBe(0xffff);
+  const locator = end - 20;
+  expect(view.getUint32(locator, true)).toBe(0x07064b50);
+  const large = Number(view.getBigUint64(locator + 8, true));
+  expect(view.getUint32(large, true)).toBe(0x06064b50);
+  expect(view.getBigUint64(large + 32, true)).toBe(BigInt(count));
+  expect(view.getUint32(Number(view.getBigUint64(large + 48, true)), true)).toBe(0x02014b50);
+});

@@ -1,10 +1,15 @@
 // Writes files into a ZIP archive without compression (APPNOTE.TXT 6.3, sections 4.3.7, 4.3.12 and
-// 4.3.16), names in UTF-8.
+// 4.3.14 to 4.3.16), names in UTF-8. There may be any number of files, of less than 4 GiB in all.
 
 const LOCAL = 0x04034b50;
 const CENTRAL = 0x02014b50;
 const END = 0x06054b50;
+const LARGE_END = 0x06064b50;
+const LARGE_END_LOCATOR = 0x07064b50;
 const VERSION = 20;
+const LARGE_VERSION = 45;
+/** The number of files in the end of an archive that has this many or more. */
+const MANY = 0xffff;
 /** Names are UTF-8. */
 const UTF8 = 0x0800;
 /** 1 January 1980, the earliest date. */
@@ -40,17 +45,35 @@ export function zipped(files: ReadonlyMap<string, readonly Uint8Array[]>): Blob 
     offset += header.length + size;
   }
   const size = central.reduce((sum, { length }) => sum + length, 0);
+  const count = central.length;
+  const largeEnd: [number, number][] = [
+    [4, LARGE_END],
+    [8, 44],
+    [2, LARGE_VERSION],
+    [2, LARGE_VERSION],
+    [4, 0],
+    [4, 0],
+    [8, count],
+    [8, count],
+    [8, size],
+    [8, offset],
+    [4, LARGE_END_LOCATOR],
+    [4, 0],
+    [8, offset + size],
+    [4, 1],
+  ];
   const end: [number, number][] = [
     [4, END],
     [2, 0],
     [2, 0],
-    [2, central.length],
-    [2, central.length],
+    [2, Math.min(count, MANY)],
+    [2, Math.min(count, MANY)],
     [4, size],
     [4, offset],
     [2, 0],
   ];
-  return new Blob([...parts, ...central, bytesOf(end)], { type: "application/zip" });
+  const ends = bytesOf(count < MANY ? end : [...largeEnd, ...end]);
+  return new Blob([...parts, ...central, ends], { type: "application/zip" });
 }
 
 /** Numbers of these lengths in bytes, little-endian, and what follows. */
@@ -61,7 +84,8 @@ function bytesOf(numbers: readonly [number, number][], after = new Uint8Array())
   let at = 0;
   for (const [bytes, value] of numbers) {
     if (bytes === 2) view.setUint16(at, value, true);
-    else view.setUint32(at, value, true);
+    else if (bytes === 4) view.setUint32(at, value, true);
+    else view.setBigUint64(at, BigInt(value), true);
     at += bytes;
   }
   written.set(after, at);
