@@ -161,6 +161,30 @@ test.each([true, false])(
   },
 );
 
+test("a stream in a tab that is opened in the background rests until somebody looks", async () => {
+  const page = vi.spyOn(document, "visibilityState", "get").mockReturnValue("hidden");
+  let opened = 0;
+  const following = follow(
+    async function* (abort) {
+      opened += 1;
+      yield "heartbeat";
+      await untilAborted(abort);
+    },
+    () => true,
+    { restsWhileHidden: true },
+  );
+  await vi.advanceTimersByTimeAsync(600_000);
+  const before = opened;
+  await vi.advanceTimersByTimeAsync(600_000);
+  expect(opened).toBe(before);
+  page.mockReturnValue("visible");
+  document.dispatchEvent(new Event("visibilitychange"));
+  await vi.advanceTimersByTimeAsync(0);
+  expect(opened).toBe(before + 1);
+  following.stop();
+  page.mockRestore();
+});
+
 /** What a call that is aborted throws. */
 function untilAborted(abort: AbortSignal): Promise<never> {
   return new Promise((_, reject) => {

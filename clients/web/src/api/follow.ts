@@ -98,6 +98,8 @@ export function follow<Message>(
   };
   const watchdog = setInterval(dropIfSilent, WATCH_EVERY_MS);
   document.addEventListener("visibilitychange", revive);
+  // The page may be hidden from the start, in a tab in the background.
+  revive();
   window.addEventListener("online", reopen);
 
   const end = (last: Link) => {
