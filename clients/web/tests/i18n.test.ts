@@ -31,6 +31,36 @@ test.each(languages)(
   },
 );
 
+/** The texts of a language by their paths; of functions, what they say of these numbers. */
+function said(texts: object, above = ""): [path: string, text: string][] {
+  return Object.entries(texts).flatMap(([name, text]): [string, string][] => {
+    const path = `${above}${name}`;
+    if (typeof text === "string") return [[path, text]];
+    if (typeof text === "object" && text !== null) return said(text, `${path}.`);
+    try {
+      return [[path, String(text(3, 5, 7, 9))]];
+    } catch {
+      // Of something else than numbers.
+      return [];
+    }
+  });
+}
+
+const numbersIn = (text: string): string[] => text.match(/\d+/g) ?? [];
+
+/** The server's sentence, which is English: other languages have one of their own. */
+const NOT_SAID = ["table.log.corrected"];
+
+test.each(languages)("in $label, no number is missing", async ({ value }) => {
+  await setLanguage(value);
+  const texts = new Map(said(t()));
+  const missing = said(en).filter(([path, text]) => {
+    const numbers = new Set(numbersIn(texts.get(path) ?? ""));
+    return !NOT_SAID.includes(path) && numbersIn(text).some((number) => !numbers.has(number));
+  });
+  expect(missing).toEqual([]);
+});
+
 /** What fits in two lines beside the clock, on a phone 390 pixels wide. */
 const BESIDE_CLOCK = 46;
 

@@ -221,7 +221,7 @@ export const lobby: Texts["lobby"] = {
       timeoutsHint: "Nach so vielen in Folge spielt ein Ersatz.",
       absence: "Abwesenheit, Sekunden",
       absenceHint:
-        "Bei jeder Entscheidung wartet die Partie so lange auf einen Platz, der nicht verbunden ist. Dann spielt ein Ersatz, bis er zurück ist.",
+        "Bei jeder Entscheidung wartet die Partie so lange auf einen Platz, der nicht verbunden ist. Dann spielt ein Ersatz, bis er zurück ist. Leer: 20 für Personen (12 in Turnieren), für andere die Zeit einer Entscheidung.",
       substitute: "Ersatz",
       abort: "Die Partie wird abgebrochen, wenn",
       aborts: { allLost: "alle Teilnehmer weg sind", anyLost: "ein Teilnehmer weg ist", never: "nie" },

@@ -221,7 +221,7 @@ export const lobby: Texts["lobby"] = {
       timeoutsHint: "Tras este número seguido juega un sustituto.",
       absence: "Ausencia, segundos",
       absenceHint:
-        "En cada decisión, la partida espera este tiempo a un asiento sin conexión. Después juega un sustituto hasta que vuelve.",
+        "En cada decisión, la partida espera este tiempo a un asiento sin conexión. Después juega un sustituto hasta que vuelve. Vacío: 20 para personas (12 en torneos), para los demás el tiempo de una decisión.",
       substitute: "Sustituto",
       abort: "La partida se interrumpe cuando",
       aborts: {
