@@ -184,12 +184,17 @@ test("a due game is called or postponed, a void one called again, and no other g
     number: 1,
     seats: [{ participant: game }, { participant: 0 }],
   }));
-  vi.spyOn(tournamentApi, "listTournamentGames").mockResolvedValue(
-    create(ListTournamentGamesResponseSchema, { games }),
-  );
+  const list = vi
+    .spyOn(tournamentApi, "listTournamentGames")
+    .mockResolvedValue(create(ListTournamentGamesResponseSchema, { games }));
   const call = vi.spyOn(tournamentApi, "callGame").mockResolvedValue(create(CallGameResponseSchema));
   const postpone = vi.spyOn(tournamentApi, "postponeGame").mockResolvedValue(create(PostponeGameResponseSchema));
   const live = { tournament: tournament(names, TournamentState.PLAYING), standings: [], games: [] };
+  // Another part of the page shows them, too.
+  await act(() => render([<ManageGames key="one" live={live} />, <ManageGames key="other" live={live} />], root));
+  await settle();
+  expect(root.querySelectorAll('[data-part="manage-games"]')).toHaveLength(2);
+  expect(list).toHaveBeenCalledTimes(1);
   await act(() => render(<ManageGames live={live} />, root));
   await settle();
   const [due, again, ...others] = root.querySelectorAll("li");

@@ -62,8 +62,7 @@ export const MAX_GAMES = PAGE_SIZE * MAX_PAGES;
 
 /** All games of a tournament, updated with those from the stream. */
 export function useGames({ tournament, games }: LiveTournament): TournamentGame[] {
-  const { tournamentId } = tournament;
-  const listed = usePolled((abort) => listGames(tournamentId, abort), quietMs(tournament), useChanges(tournament));
+  const listed = usePolled(() => listGames(tournament), quietMs(tournament), useChanges(tournament));
   return mergedGames(listed.value ?? [], games);
 }
 
@@ -101,10 +100,20 @@ function useChanges({ tournamentId, state, round, gamesOver, gamesPlaying }: Tou
   return throttled;
 }
 
-function listGames(tournamentId: string, abort: AbortSignal): Promise<TournamentGame[]> {
-  return allPages(async (pageToken) => {
-    const asked = { tournamentId, pageSize: PAGE_SIZE, pageToken };
-    const answer = await tournamentApi.listTournamentGames(asked, { signal: abort });
+/** Requests within this time count as one, milliseconds: several parts of a page want the same games at once. */
+const AT_ONCE_MS = 1_000;
+/** The last request for each state of a tournament. */
+const requested = new WeakMap<Tournament, { readonly atMs: number; readonly games: Promise<TournamentGame[]> }>();
+
+function listGames(tournament: Tournament): Promise<TournamentGame[]> {
+  const nowMs = performance.now();
+  const last = requested.get(tournament);
+  if (last && nowMs - last.atMs < AT_ONCE_MS) return last.games;
+  const { tournamentId } = tournament;
+  const games = allPages(async (pageToken) => {
+    const answer = await tournamentApi.listTournamentGames({ tournamentId, pageSize: PAGE_SIZE, pageToken });
     return { items: answer.games, nextPageToken: answer.nextPageToken };
   }, MAX_PAGES);
+  requested.set(tournament, { atMs: nowMs, games });
+  return games;
 }
