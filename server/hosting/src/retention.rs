@@ -277,9 +277,7 @@ mod tests {
         let count = GAMES_DELETED_AT_ONCE + 2;
         let count = u8::try_from(count).expect("few");
         finished(store.as_ref(), 1..=count).await;
-        let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, Arc::clone(&store) as _, TaskTracker::new());
-        let rooms = rooms.expect("threads");
+        let rooms = Rooms::for_tests(Arc::clone(&store) as _);
         let retention = Retention::new(Arc::clone(&rooms));
         let newest = Keep {
             newest: Some(1),

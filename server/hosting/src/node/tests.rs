@@ -145,38 +145,17 @@ impl TestNode {
 
     /// Waits until a room runs here.
     async fn has(&self, room: RoomId) -> Handle {
-        let found = async {
-            loop {
-                match self.rooms.get(room) {
-                    Some(handle) => return handle,
-                    None => sleep(Duration::from_millis(10)).await,
-                }
-            }
-        };
-        soon(found).await
+        found(|| self.rooms.get(room)).await
     }
 
     /// Waits until a room does not run here any more.
     async fn loses(&self, room: RoomId) {
-        let lost = async {
-            while self.rooms.get(room).is_some() {
-                sleep(Duration::from_millis(10)).await;
-            }
-        };
-        soon(lost).await;
+        until(|| self.rooms.get(room).is_none()).await;
     }
 
     /// Waits until a tournament runs here.
     async fn has_tournament(&self, id: TournamentId) -> Arc<TournamentHandle> {
-        let found = async {
-            loop {
-                match self.tournaments.get(id) {
-                    Some(handle) => return handle,
-                    None => sleep(Duration::from_millis(10)).await,
-                }
-            }
-        };
-        soon(found).await
+        found(|| self.tournaments.get(id)).await
     }
 }
 
@@ -184,6 +163,24 @@ async fn soon<T>(future: impl Future<Output = T>) -> T {
     timeout(SOON, future)
         .await
         .expect("it does not take that long")
+}
+
+/// Waits until there is something.
+async fn found<T>(find: impl Fn() -> Option<T>) -> T {
+    let finding = async {
+        loop {
+            match find() {
+                Some(found) => return found,
+                None => sleep(Duration::from_millis(1)).await,
+            }
+        }
+    };
+    soon(finding).await
+}
+
+/// Waits until something holds.
+async fn until(holds: impl Fn() -> bool) {
+    found(|| holds().then_some(())).await;
 }
 
 /// Takes a seat. The answer says that this is committed.
@@ -277,12 +274,7 @@ async fn a_node_that_joins_gets_its_share_of_the_rooms() {
     first.rooms.directory().avoid(&peer);
     assert_eq!(first.rooms.place().await, None, "it cannot be reached");
 
-    let balanced = async {
-        while second.rooms.open_count() < 15 || first.rooms.open_count() > 16 {
-            sleep(Duration::from_millis(10)).await;
-        }
-    };
-    soon(balanced).await;
+    until(|| second.rooms.open_count() >= 15 && first.rooms.open_count() <= 16).await;
     assert!(first.shows("chefshat_handovers_total 15"));
     // Nothing is handed over any more, and nothing was lost.
     sleep(SOON).await;
@@ -305,20 +297,10 @@ async fn rooms_that_were_handed_over_come_back_at_once_from_a_node_that_leaves()
     for _ in 0..20 {
         first.create_room().await;
     }
-    let handed_over = async {
-        while second.rooms.open_count() < 10 || first.rooms.open_count() > 10 {
-            sleep(Duration::from_millis(1)).await;
-        }
-    };
-    soon(handed_over).await;
+    until(|| second.rooms.open_count() >= 10 && first.rooms.open_count() <= 10).await;
     let asked = Instant::now();
     soon(second.node.drain()).await;
-    let back = async {
-        while first.rooms.open_count() < 20 {
-            sleep(Duration::from_millis(1)).await;
-        }
-    };
-    soon(back).await;
+    until(|| first.rooms.open_count() >= 20).await;
     assert!(asked.elapsed() < LEFT_TO_NEXT, "{:?}", asked.elapsed());
 }
 
@@ -358,13 +340,8 @@ async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
     }
     second.store.loads_held.send_replace(true);
     drop(first);
-    let all_claimed = async {
-        let node = second.store.node();
-        while !rooms.iter().all(|room| database.owner(*room) == Some(node)) {
-            sleep(Duration::from_millis(10)).await;
-        }
-    };
-    soon(all_claimed).await;
+    let node = Some(second.store.node());
+    until(|| rooms.iter().all(|room| database.owner(*room) == node)).await;
     // Until everything waits for the store.
     sleep(Duration::from_millis(1)).await;
     assert_eq!(*second.store.loads.borrow() as usize, LOADS_AT_ONCE);
@@ -710,6 +687,18 @@ async fn looking_for_rooms_takes_no_longer_if_the_database_hangs_and_many_look()
     assert!(began.elapsed() < 2 * LOOK_LIMIT, "{:?}", began.elapsed());
 }
 
+fn entry(name: &str, at_table: bool) -> Entry {
+    Entry {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind: ParticipantKind::Human,
+        max_games: 1,
+        stateless: false,
+        at_table,
+        request_id: None,
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_tournament_changes_hands_with_its_rooms() {
     let database = Database::new();
@@ -725,24 +714,10 @@ async fn a_tournament_changes_hands_with_its_rooms() {
     let made = (first.tournaments).create("Coppa", plan, None, Key::Local);
     let (old, _) = made.await.expect("made");
     for name in ["Ada", "Bo", "Cy", "Di"] {
-        let entry = Entry {
-            name: name.into(),
-            name_fingerprint: String::new(),
-            kind: ParticipantKind::Human,
-            max_games: 1,
-            stateless: false,
-            at_table: true,
-            request_id: None,
-        };
-        soon(old.join(entry)).await.expect("joined");
+        soon(old.join(entry(name, true))).await.expect("joined");
     }
     soon(old.begin()).await.expect("begun");
-    let playing = async {
-        while first.rooms.open_count() == 0 {
-            sleep(Duration::from_millis(10)).await;
-        }
-    };
-    soon(playing).await;
+    until(|| first.rooms.open_count() > 0).await;
     let room = first.rooms.newest(None, None, 1)[0].1.id();
     first.store.cut_off.send_replace(true);
 
@@ -768,20 +743,11 @@ async fn a_participant_who_comes_when_its_tournament_stops_reconnects() {
     let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
     let made = (first.tournaments).create("Coppa", plan, None, Key::Local);
     let (old, _) = made.await.expect("made");
-    let entry = |name: &str| Entry {
-        name: name.into(),
-        name_fingerprint: String::new(),
-        kind: ParticipantKind::Agent,
-        max_games: 1,
-        stateless: false,
-        at_table: false,
-        request_id: None,
-    };
-    let (ada, ticket) = soon(old.join(entry("Ada"))).await.expect("joined");
+    let (ada, ticket) = soon(old.join(entry("Ada", false))).await.expect("joined");
     // Its task waits for a commit, and reads nothing more.
     first.store.cut_off.send_replace(true);
     let late = tokio::spawn({
-        let (old, entry) = (Arc::clone(&old), entry("Bo"));
+        let (old, entry) = (Arc::clone(&old), entry("Bo", false));
         async move { old.join(entry).await.is_ok() }
     });
     tokio::task::yield_now().await;
@@ -799,12 +765,7 @@ async fn a_participant_who_comes_when_its_tournament_stops_reconnects() {
     assert_eq!(new.describe().participants.len(), 1);
     first.store.cut_off.send_replace(false);
     assert!(!soon(late).await.expect("no panic"));
-    let ended = async {
-        while outbox.is_open() {
-            sleep(Duration::from_millis(10)).await;
-        }
-    };
-    soon(ended).await;
+    until(|| !outbox.is_open()).await;
 }
 
 #[tokio::test(start_paused = true)]
@@ -832,12 +793,7 @@ async fn the_end_of_a_game_is_read_once_for_all_who_ask_when_its_node_is_gone() 
     let room = first.create_room().await;
     soon(join(&room, "Ada")).await.expect("it runs");
     room.close_without_token().await;
-    let over = async {
-        while first.rooms.is_over(room.id()) != Some(true) {
-            sleep(Duration::from_millis(10)).await;
-        }
-    };
-    soon(over).await;
+    until(|| first.rooms.is_over(room.id()) == Some(true)).await;
     drop(first);
 
     second.store.ends_unreadable.send_replace(true);

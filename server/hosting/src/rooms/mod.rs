@@ -82,6 +82,13 @@ impl Rooms {
         Self::of_node(config, store, Arc::new(SingleServer), None, tracker)
     }
 
+    /// Creates an empty set with the default settings, for tests.
+    #[cfg(test)]
+    pub(crate) fn for_tests(store: Arc<dyn Store>) -> Arc<Self> {
+        let config = ServerConfig::default();
+        Self::new(&config, store, TaskTracker::new()).expect("threads")
+    }
+
     /// Creates an empty set, of a node of a cluster. `directory` knows the other nodes' rooms. If
     /// rooms can be taken over by other nodes, they publish while `lease` holds.
     ///

@@ -17,7 +17,7 @@ use chefshat_store::{MemoryStore, ResumableGame};
 async fn participants_of_a_tournament_are_committed_with_their_room() {
     // It stores new games, but no further entries.
     let store = Arc::new(FailingStore::after(0));
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let rooms = Rooms::for_tests(store);
     let fill = Fill::Open {
         reserved_for: Some(ParticipantKind::Agent),
     };
@@ -51,12 +51,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
 #[tokio::test]
 async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
     let store = Arc::new(MemoryStore::default());
-    let rooms = Rooms::new(
-        &ServerConfig::default(),
-        Arc::clone(&store) as _,
-        TaskTracker::new(),
-    );
-    let rooms = rooms.expect("threads");
+    let rooms = Rooms::for_tests(Arc::clone(&store) as _);
     let made = rooms.create(NewRoom::for_tests());
     let open = made.await.expect("a room").handle.id();
     let header = rooms.header(open).expect("it exists");
@@ -87,8 +82,7 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
 #[tokio::test]
 async fn the_room_of_a_game_is_found_until_the_game_is_over() {
     let store = Arc::new(MemoryStore::default());
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
-    let rooms = rooms.expect("threads");
+    let rooms = Rooms::for_tests(store);
     let mut made = Vec::new();
     for _ in 0..3 {
         let room = rooms.create(NewRoom::for_tests()).await.expect("a room");
@@ -120,8 +114,7 @@ fn a_room_may_end_with_the_handle_that_the_table_removes() {
     let runtime = tokio::runtime::Runtime::new().expect("threads");
     let (rooms, room) = runtime.block_on(async {
         let store = Arc::new(MemoryStore::default());
-        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
-        let rooms = rooms.expect("threads");
+        let rooms = Rooms::for_tests(store);
         let made = rooms.create(NewRoom::for_tests()).await.expect("a room");
         let room = made.handle.id();
         (rooms, room)
@@ -141,7 +134,7 @@ fn a_room_may_end_with_the_handle_that_the_table_removes() {
 #[tokio::test]
 async fn the_end_of_a_game_wakes_only_its_own_unit() {
     let store = Arc::new(MemoryStore::default());
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let rooms = Rooms::for_tests(store);
     let created = async || {
         rooms
             .create(NewRoom::for_tests())
@@ -244,7 +237,7 @@ async fn who_creates_one_room_too_many_is_first_told_that_the_server_stops() {
 async fn a_room_that_fails_takes_no_place_and_its_unit_learns_of_it() {
     let store = Arc::new(FailingStore::after(u64::MAX));
     let panics = Arc::clone(&store.journals_panic);
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let rooms = Rooms::for_tests(store);
     let handle = (rooms.create(NewRoom::for_tests()).await)
         .expect("a room")
         .handle;

@@ -216,9 +216,7 @@ mod tests {
 
     use chefshat_room::ids::Id;
     use chefshat_room::journal::GameHeader;
-    use tokio_util::task::TaskTracker;
 
-    use crate::config::ServerConfig;
     use crate::rooms::NewRoom;
     use crate::tournaments::leaderboard::*;
     use chefshat_store::MemoryStore;
@@ -462,12 +460,7 @@ mod tests {
 
     /// The rooms of a node that has this store.
     fn rooms(store: &Arc<dyn Store>) -> Arc<Rooms> {
-        Rooms::new(
-            &ServerConfig::default(),
-            Arc::clone(store),
-            TaskTracker::new(),
-        )
-        .expect("threads")
+        Rooms::for_tests(Arc::clone(store))
     }
 
     /// Stores a game that another node has played.

@@ -14,18 +14,33 @@ use chefshat_store::testing::{FailingStore, TypedUnits as _};
 use chefshat_store::{SqliteStore, Store};
 use chefshat_tournament::{ByHandProblem, GameState};
 
-#[tokio::test]
-async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
+/// A new database, in a folder of its own.
+async fn database() -> (tempfile::TempDir, Arc<dyn Store>) {
     let folder = tempfile::tempdir().expect("a folder");
     let store = SqliteStore::open(folder.path()).await.expect("a new one");
-    let store: Arc<dyn Store> = Arc::new(store);
+    (folder, Arc::new(store))
+}
+
+/// The tournaments of a server with this store.
+fn server(store: Arc<dyn Store>) -> Arc<Tournaments> {
+    Tournaments::new(Rooms::for_tests(store), TaskTracker::new())
+}
+
+/// A new tournament with these settings.
+async fn created(
+    tournaments: &Arc<Tournaments>,
+    settings: &chefshat_proto::v1::TournamentSettings,
+) -> Arc<TournamentHandle> {
+    let plan = convert::tournament_plan(settings, [7; 32]).expect("valid settings");
+    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
+    created.expect("made").0
+}
+
+#[tokio::test]
+async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
+    let (_folder, store) = database().await;
     let tracker = TaskTracker::new();
-    let rooms = Rooms::new(
-        &ServerConfig::default(),
-        Arc::clone(&store),
-        tracker.clone(),
-    )
-    .expect("threads");
+    let rooms = Rooms::for_tests(Arc::clone(&store));
     let tournaments = Tournaments::new(rooms, tracker.clone());
     let settings = chefshat_proto::v1::TournamentSettings {
         format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
@@ -88,13 +103,8 @@ fn entrant(name: &str) -> Entry {
 async fn readers_see_only_committed_changes() {
     let store = Arc::new(chefshat_store::testing::FailingStore::after(u64::MAX));
     let commits = Arc::clone(&store.tournament_commits);
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-    let tournaments = Tournaments::new(rooms, TaskTracker::new());
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let tournaments = server(store);
+    let handle = created(&tournaments, &built_in("Coppa")).await;
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
 
@@ -117,9 +127,7 @@ async fn readers_see_only_committed_changes() {
 #[tokio::test]
 async fn a_forged_record_of_a_coming_game_is_not_counted() {
     use chefshat_proto::v1;
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(folder.path()).await.expect("a new one");
-    let store: Arc<dyn Store> = Arc::new(store);
+    let (_folder, store) = database().await;
     let start = |max_rooms| {
         let config = ServerConfig {
             max_rooms,
@@ -130,11 +138,7 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     };
     // No room can be created: the game has its id, and waits.
     let tournaments = start(0);
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let handle = created(&tournaments, &built_in("Coppa")).await;
     let mut changes = handle.changes();
     handle.begin().await.expect("it can start");
     let forged = loop {
@@ -181,14 +185,8 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
 
 #[tokio::test]
 async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(folder.path()).await.expect("a new one");
-    let store: Arc<dyn Store> = Arc::new(store);
-    let start = || {
-        let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
-        Tournaments::new(rooms, TaskTracker::new())
-    };
+    let (_folder, store) = database().await;
+    let start = || server(Arc::clone(&store));
     let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
     let request = RequestKey::new([1; 32], b"content");
     let ada = || Entry {
@@ -241,8 +239,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
 /// A server's tournaments in memory.
 fn in_memory() -> Arc<Tournaments> {
     let store: Arc<dyn Store> = Arc::new(chefshat_store::MemoryStore::default());
-    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-    Tournaments::at(stopped_clock, rooms, TaskTracker::new())
+    Tournaments::at(stopped_clock, Rooms::for_tests(store), TaskTracker::new())
 }
 
 std::thread_local! {
@@ -311,9 +308,7 @@ async fn it_starts_at_its_time_although_the_clock_was_set_meanwhile() {
         start_at_ms: stopped_clock() + days_ms,
         ..built_in("Coppa")
     };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-    let (handle, _) = created.expect("made");
+    let handle = created(&tournaments, &settings).await;
     let a_while = Duration::from_secs(120);
     tokio::time::sleep(a_while).await;
     assert_eq!(handle.read(Tournament::state), State::Open);
@@ -336,9 +331,7 @@ async fn games_whose_rooms_fail_are_voided() {
 async fn rooms_that_no_running_game_has_are_closed() {
     use crate::rooms::{NewRoom, PartOf, Seating};
     let tournaments = in_memory();
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-    let (handle, _) = created.expect("made");
+    let handle = created(&tournaments, &built_in("Coppa")).await;
     let game = chefshat_room::journal::TournamentGame {
         tournament: handle.id(),
         series: None,
@@ -364,15 +357,9 @@ async fn rooms_that_no_running_game_has_are_closed() {
 
 #[tokio::test]
 async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(folder.path()).await.expect("a new one");
-    let store: Arc<dyn Store> = Arc::new(store);
-    let config = ServerConfig::default();
-    let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
-    let tournaments = Tournaments::new(rooms, TaskTracker::new());
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-    let (open, _) = created.expect("made");
+    let (_folder, store) = database().await;
+    let tournaments = server(Arc::clone(&store));
+    let open = created(&tournaments, &built_in("Coppa")).await;
     // Its code was that of a tournament that another node had.
     let former = TournamentHeader {
         id: TournamentId::random(),
@@ -394,20 +381,13 @@ async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
 
 /// The games of a tournament that was played to its end on this store.
 async fn played(store: &Arc<FailingStore>) -> (Arc<TournamentHandle>, Vec<GameState>) {
-    let rooms = Rooms::new(
-        &ServerConfig::default(),
-        Arc::clone(store) as _,
-        TaskTracker::new(),
-    );
-    let tournaments = Tournaments::new(rooms.expect("threads"), TaskTracker::new());
+    let tournaments = server(Arc::clone(store) as _);
     let settings = chefshat_proto::v1::TournamentSettings {
         built_in_agents: vec!["random".into(); 4],
         start_when_joined: 4,
         ..built_in("Coppa")
     };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-    let (handle, _) = created.expect("made");
+    let handle = created(&tournaments, &settings).await;
     until(&handle, |core| core.state() == State::Finished).await;
     handle.stopped().await;
     tokio::task::yield_now().await;
@@ -458,11 +438,7 @@ async fn a_pause_ends_by_itself() {
         no_show_time_ms: 86_400_000,
         ..built_in("Coppa")
     };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let handle = created(&tournaments, &settings).await;
     for name in ["Ada", "Bo", "Cem", "Dia"] {
         let joined = handle.join(entrant(name)).await;
         joined.expect("joined");
@@ -499,11 +475,7 @@ fn cem(request_id: u8) -> Newcomer {
 #[tokio::test]
 async fn the_ticket_of_a_participant_ends_with_its_place() {
     let tournaments = in_memory();
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let handle = created(&tournaments, &built_in("Coppa")).await;
     let join = async |name| {
         let joined = handle.join(entrant(name)).await;
         joined.expect("joined")
@@ -557,11 +529,7 @@ async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
         physical_tables: 1,
         ..built_in("Coppa")
     };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let handle = created(&tournaments, &settings).await;
     let table = Entry {
         at_table: true,
         ..entrant("Ada")
@@ -610,11 +578,7 @@ async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
 async fn one_caller_cannot_join_and_withdraw_for_ever() {
     use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
     let tournaments = in_memory();
-    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
-    let (handle, _) = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .await
-        .expect("made");
+    let handle = created(&tournaments, &built_in("Coppa")).await;
     let come = async || {
         let joined = handle.join(entrant("fickle")).await;
         joined.expect("joined").1
@@ -646,14 +610,8 @@ async fn one_caller_cannot_join_and_withdraw_for_ever() {
 
 #[tokio::test]
 async fn tournaments_count_after_a_restart_too() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = SqliteStore::open(folder.path()).await.expect("a new one");
-    let store: Arc<dyn Store> = Arc::new(store);
-    let start = || {
-        let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
-        Tournaments::new(rooms, TaskTracker::new())
-    };
+    let (_folder, store) = database().await;
+    let start = || server(Arc::clone(&store));
     let settings = chefshat_proto::v1::TournamentSettings {
         format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
         ..Default::default()
