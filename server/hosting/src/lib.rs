@@ -3,6 +3,7 @@
 
 pub mod cluster;
 pub mod config;
+mod confirmed_time;
 pub mod journaled;
 pub mod node;
 pub mod participants;

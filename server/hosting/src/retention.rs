@@ -13,11 +13,13 @@ use chefshat_record::atomic_file::{self, AtomicFile, WriteError};
 use chefshat_record::jsonl;
 use chefshat_room::ids::GameId;
 use tokio::sync::Mutex;
+use tokio::time::{MissedTickBehavior, interval};
 use tracing::{error, info, warn};
 
 use crate::config::{DELETION_PAUSE, GAMES_DELETED_AT_ONCE, KeepGames};
+use crate::confirmed_time::ConfirmedTime;
 use crate::rooms::Rooms;
-use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_base::tasks::short;
 use chefshat_store::samples::Undeleted;
 use chefshat_store::{DiskUsage, Keep, StoreError};
@@ -29,9 +31,9 @@ const INTERVAL: Duration = Duration::from_secs(600);
 /// deleted when none of their files is left.
 const PRUNING: &str = "pruning";
 
-/// Which games a setting keeps now.
-fn kept_now(setting: KeepGames) -> Keep {
-    match setting {
+/// Which games a setting keeps at a time of day; `None` if that is not confirmed yet and matters.
+fn kept_at(setting: KeepGames, confirmed_ms: Option<u64>) -> Option<Keep> {
+    Some(match setting {
         KeepGames::Newest(count) => Keep {
             newest: Some(count),
             ..Keep::default()
@@ -39,11 +41,11 @@ fn kept_now(setting: KeepGames) -> Keep {
         KeepGames::For(time) => {
             let ms = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
             Keep {
-                ended_since_ms: Some(since_epoch_ms().saturating_sub(ms)),
+                ended_since_ms: Some(confirmed_ms?.saturating_sub(ms)),
                 ..Keep::default()
             }
         }
-    }
+    })
 }
 
 /// What was deleted.
@@ -72,6 +74,7 @@ pub struct Usage {
 #[derive(Debug, Clone)]
 pub struct Retention {
     rooms: Arc<Rooms>,
+    now: TimeOfDay,
     /// Locked by the run that deletes: each notes what it deletes in the same file.
     running: Arc<Mutex<()>>,
 }
@@ -81,6 +84,7 @@ impl Retention {
     pub fn new(rooms: Arc<Rooms>) -> Self {
         Self {
             rooms,
+            now: since_epoch_ms,
             running: Arc::default(),
         }
     }
@@ -201,12 +205,17 @@ impl Retention {
         ids.lines().filter_map(GameId::parse).collect()
     }
 
-    /// Deletes games on a schedule, until the future is dropped.
+    /// Deletes games on a schedule, until the future is dropped. A game goes by its age once that has
+    /// been confirmed for an hour.
     pub async fn follow(self, keep: KeepGames) {
-        let mut interval = tokio::time::interval(INTERVAL);
+        let mut runs = interval(INTERVAL);
+        runs.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut time = ConfirmedTime::default();
         loop {
-            interval.tick().await;
-            if let Err(error) = self.prune(kept_now(keep)).await {
+            runs.tick().await;
+            if let Some(keep) = kept_at(keep, time.look((self.now)()))
+                && let Err(error) = self.prune(keep).await
+            {
                 error!(%error, "deleting old games failed");
             }
         }
@@ -246,6 +255,7 @@ fn size_of(folder: &Path) -> (u64, u64) {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
     use std::sync::atomic::Ordering;
 
     use chefshat_record::samples;
@@ -295,6 +305,38 @@ mod tests {
         assert_eq!(pruned.games, 0, "the first run has deleted it");
         assert_eq!(store.finished_games().await, Ok(1));
         assert_eq!(rooms.forgotten(), 2);
+    }
+
+    std::thread_local! {
+        /// The time of day of this thread, milliseconds.
+        static NOW_MS: Cell<u64> = const { Cell::new(0) };
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_clock_that_was_ahead_deletes_no_game() {
+        const HOUR: Duration = Duration::from_secs(3_600);
+        let (day, day_ms) = (24 * HOUR, 24 * 3_600 * 1_000);
+        let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
+        finished(store.as_ref(), 1..=3).await;
+        let rooms = Rooms::for_tests(Arc::clone(&store));
+        let retention = Retention {
+            now: || NOW_MS.get(),
+            ..Retention::new(rooms)
+        };
+        NOW_MS.set(day_ms);
+        let following = tokio::spawn(retention.follow(KeepGames::For(day)));
+        let later = async |time| {
+            tokio::time::sleep(time).await;
+            store.finished_games().await
+        };
+        assert_eq!(later(3 * HOUR).await, Ok(3), "they are young");
+        NOW_MS.set(365 * day_ms);
+        assert_eq!(later(HOUR * 3 / 4).await, Ok(3));
+        NOW_MS.set(day_ms);
+        assert_eq!(later(3 * HOUR).await, Ok(3), "the clock was ahead");
+        NOW_MS.set(3 * day_ms);
+        assert_eq!(later(2 * HOUR).await, Ok(1), "the newest is always kept");
+        following.abort();
     }
 
     /// What the store keeps, keeps its files, also if it was to be deleted; and what a server that ended

@@ -5,17 +5,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::{StreamExt as _, future, stream};
-use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
+use tokio::task::JoinHandle;
+use tokio::time::{MissedTickBehavior, interval, timeout};
 use tracing::{info, warn};
 
 use super::{Studies, StudyHandle};
+use crate::confirmed_time::{CONFIRMATION_TIME, ConfirmedTime};
+use chefshat_base::tasks::short;
 use chefshat_room::ids::StudyId;
 
 /// Time between two checks of the dates.
 const CHECK_INTERVAL: Duration = Duration::from_secs(600);
-/// For how long a date must have passed at every check: a clock may jump ahead and back, and what is
-/// deleted stays deleted.
-const CONFIRMATION_TIME: Duration = Duration::from_secs(3_600);
 /// Studies that are deleted at a time.
 const DELETED_AT_ONCE: usize = 4;
 /// How long each is waited for.
@@ -25,70 +25,52 @@ const _: () = assert!(
     "the page and the protocol say that it takes two hours at most"
 );
 
-/// A study whose date has passed.
-#[derive(Debug)]
-struct Passed {
-    since: Instant,
-    /// The study whose deletion was requested; it completes when its games have ended. One that was
-    /// resumed since is another, which knows of no request.
-    requested: Option<Arc<StudyHandle>>,
-}
-
 impl Studies {
     /// Deletes each study with all its data when the date of its settings has passed for an hour or
     /// little more, until the future is dropped.
     pub async fn delete_when_due(self: Arc<Self>) {
         let mut checks = interval(CHECK_INTERVAL);
         checks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut passed: BTreeMap<StudyId, Passed> = BTreeMap::new();
+        let mut time = ConfirmedTime::default();
+        // Deletions that wait for the ends of games.
+        let mut waiting: BTreeMap<StudyId, JoinHandle<()>> = BTreeMap::new();
         loop {
             checks.tick().await;
-            let studies = self.past_their_dates();
-            passed.retain(|id, _| studies.iter().any(|study| study.id() == *id));
-            let mut due = Vec::new();
-            for study in studies {
-                let it = passed.entry(study.id()).or_insert_with(|| {
-                    info!(study = %study.id(), "the date at which a study is deleted has come");
-                    let since = Instant::now();
-                    Passed {
-                        since,
-                        requested: None,
-                    }
-                });
-                let is_requested = it
-                    .requested
-                    .as_ref()
-                    .is_some_and(|it| Arc::ptr_eq(it, &study));
-                if it.since.elapsed() >= CONFIRMATION_TIME && !is_requested {
-                    it.requested = Some(Arc::clone(&study));
-                    due.push(study);
-                }
-            }
+            // A study that is still there was not deleted, or was resumed since: it is tried again.
+            waiting.retain(|_, deleting| !deleting.is_finished());
+            let Some(now_ms) = time.look((self.common.now)()) else {
+                continue;
+            };
+            let mut due = self.past_their_dates(now_ms);
+            due.retain(|study| !waiting.contains_key(&study.id()));
             let deleting = due.into_iter().map(|study| async {
                 let id = study.id();
-                match timeout(DELETION_TIMEOUT, self.delete(study, true)).await {
-                    Ok(Ok(_)) => None,
-                    Ok(Err(_)) => {
-                        warn!(study = %id, "a study could not be deleted at its date; it is tried again");
-                        Some(id)
-                    }
-                    Err(_) => {
-                        warn!(study = %id, "a study is deleted as soon as its games have ended");
-                        None
-                    }
+                let mut deleting = tokio::spawn(short(
+                    "one tournament or study",
+                    Arc::clone(&self).delete_at_date(study),
+                ));
+                if timeout(DELETION_TIMEOUT, &mut deleting).await.is_ok() {
+                    return None;
                 }
+                warn!(study = %id, "a study is deleted as soon as its games have ended");
+                Some((id, deleting))
             });
             let deleting = stream::iter(deleting).buffer_unordered(DELETED_AT_ONCE);
-            let failed: Vec<StudyId> = deleting.filter_map(future::ready).collect().await;
-            for id in failed {
-                passed.entry(id).and_modify(|it| it.requested = None);
-            }
+            let unfinished: Vec<_> = deleting.filter_map(future::ready).collect().await;
+            waiting.extend(unfinished);
         }
     }
 
-    /// The studies whose dates have passed.
-    fn past_their_dates(&self) -> Vec<Arc<StudyHandle>> {
-        let now_ms = (self.common.now)();
+    async fn delete_at_date(self: Arc<Self>, study: Arc<StudyHandle>) {
+        let id = study.id();
+        info!(study = %id, "the date of a study has passed for an hour; it is deleted");
+        if self.delete(study, true).await.is_err() {
+            warn!(study = %id, "a study could not be deleted at its date; it is tried again");
+        }
+    }
+
+    /// The studies whose dates had passed at this time.
+    fn past_their_dates(&self, now_ms: u64) -> Vec<Arc<StudyHandle>> {
         let studies = self.earlier(None).into_iter().map(|(_, study)| study);
         let is_past = |study: &Arc<StudyHandle>| {
             let at_ms = study.read(|core| core.settings().deletes_at_ms);

@@ -537,6 +537,43 @@ async fn all_who_wait_for_rooms_get_them_after_a_restart_and_a_taken_id_ends_one
     let other = GameHeader {
         game_id: convert::game_of(&placed(&lab.study, TAKEN)),
         ..GameHeader::clone(&header(9, Durability::Ephemeral))
+#[tokio::test(start_paused = true)]
+async fn a_study_that_could_not_be_deleted_at_its_date_is_tried_again_however_late_that_is() {
+    const HOUR: Duration = Duration::from_secs(3_600);
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    let dated = v1::StudySettings {
+        deletes_at_ms: stopped_clock() + 1_000,
+        ..settings()
+    };
+    let lab = Lab::with(&config, dated, 2).await;
+    let present = lab.begin().await;
+    let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
+    let game = convert::game_of(&game).to_string();
+    let stuck = samples::path_of(folder.path(), &game, 0);
+    std::fs::create_dir_all(&stuck).expect("created");
+    // Its task waits for what is being written, longer than it is waited for.
+    let writing = Arc::clone(&lab.study.shared.traces).lock_owned().await;
+    let study = Arc::clone(&lab.study);
+    let withdrawing = tokio::spawn(async move { study.withdraw(2, true).await });
+    let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
+    tokio::time::sleep(2 * HOUR).await;
+    drop((writing, present));
+    withdrawing.await.expect("no panic").expect("withdrawn");
+    tokio::time::sleep(HOUR).await;
+    assert!(
+        lab.studies.get(lab.study.id()).is_some(),
+        "samples are left"
+    );
+    std::fs::remove_dir(&stuck).expect("removed");
+    tokio::time::sleep(HOUR).await;
+    assert!(lab.studies.get(lab.study.id()).is_none());
+    deleting.abort();
+}
+
     };
     let created = lab.store.create(Arc::new(other), Vec::new()).await;
     let _held = created.expect("its id is free");
