@@ -260,12 +260,19 @@ impl Journaled for StudyTask {
     /// Deletes the data of participants who want it, once their games are over: of all of them
     /// together, because each time the whole journal is read and written.
     async fn delete(&mut self) -> Result<(), StoreError> {
-        let mut due: BTreeSet<u32> = self.unit.handle.lock_deleting().keys().copied().collect();
-        due.retain(|number| !self.playing.contains(number));
-        if due.is_empty() || self.delete_again.is_some_and(|at| at > Instant::now()) {
+        let is_again = self.delete_again.is_none_or(|at| at <= Instant::now());
+        if is_again {
+            self.delete_again = None;
+        }
+        let deleting = self.unit.handle.lock_deleting().clone();
+        // What the file system keeps of one holds up no other.
+        let due = (deleting.into_iter())
+            .filter(|(_, has_failed)| is_again || !has_failed)
+            .map(|(number, _)| number);
+        let due: BTreeSet<u32> = due.filter(|it| !self.playing.contains(it)).collect();
+        if due.is_empty() {
             return Ok(());
         }
-        self.delete_again = None;
         let handle = Arc::clone(&self.unit.handle);
         let mut counts = handle.shared.traces.lock().await;
         let is_changed = self.forget(&due).await?;
@@ -289,7 +296,8 @@ impl Journaled for StudyTask {
         }
         if !undeleted.is_empty() {
             warn_of(handle.id(), &undeleted);
-            self.delete_again = Some(Instant::now() + DELETION_RETRY);
+            let again = Instant::now() + DELETION_RETRY;
+            self.delete_again.get_or_insert(again);
         }
         let failed = |number: u32| {
             let participant = self.unit.state.participant(number);

@@ -435,6 +435,9 @@ async fn a_study_is_deleted_at_its_date_and_not_when_the_clock_jumps() {
     let other = lab.studies.create(settings(), None, Key::Local).await;
     let other = other.expect("valid settings").0;
     let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
+    let before = tokio::time::Instant::now();
+    assert_eq!(lab.study.withdraw(2, true).await, Ok(()));
+    assert!(before.elapsed() < DELETION_RETRY, "and wait for nobody");
     let is_there = |id| lab.studies.get(id).is_some();
     assert_eq!(lab.open(1).await, Ok(1));
     let present = lab.study.present(1, 1).await;
