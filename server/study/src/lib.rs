@@ -91,6 +91,9 @@ use state::StudyState;
 /// For how long the date of a study must have passed before the study is closed, in milliseconds: a
 /// clock may jump ahead and back, and what is closed stays closed.
 pub const CONFIRMATION_TIME_MS: u64 = 600_000;
+/// How often a study looks whether its date has passed, in milliseconds: the clock may be set
+/// meanwhile, or the machine sleep.
+pub const CLOCK_CHECK_MS: u64 = 60_000;
 
 /// A study. Two are equal if their changes have led to the same state; who is connected does not
 /// matter.
@@ -350,7 +353,7 @@ impl Study {
             (Some(since_ms), _) => {
                 Some((since_ms + CONFIRMATION_TIME_MS).saturating_sub(elapsed_ms))
             }
-            (None, end_ms) => end_ms.map(|at_ms| at_ms.saturating_sub(now_ms)),
+            (None, end_ms) => end_ms.map(|at_ms| at_ms.saturating_sub(now_ms).min(CLOCK_CHECK_MS)),
         };
         let close = close.filter(|_| !self.is_closed());
         by_presence.into_iter().chain(close).min()

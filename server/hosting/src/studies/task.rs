@@ -16,7 +16,7 @@ use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
-use chefshat_base::clock::TimeOfDay;
+use chefshat_base::clock::{RoomClock, TimeOfDay};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, GameId, RoomId, SecretHash, StudyId};
 use chefshat_store::StoreError;
@@ -56,8 +56,8 @@ pub struct StudyTask {
     pub(super) playing: BTreeSet<u32>,
     /// Those of them whose game has no room yet.
     pub(super) without_room: BTreeSet<u32>,
-    /// When the task began.
-    began: Instant,
+    /// Since the task began: a pause of the process makes no participant late.
+    clock: RoomClock,
     /// Rooms that were asked to close.
     pub(super) closing: BTreeSet<RoomId>,
     /// Rooms that were asked to give up the seat of a participant.
@@ -151,13 +151,13 @@ impl Journaled for StudyTask {
         let deleted = participants.iter().filter(|(_, it)| it.data_deleted);
         *unit.handle.lock_deleting() = deleted.map(|(number, _)| (*number, false)).collect();
         Self {
+            clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
             unit,
             now: common.now,
             streams: BTreeMap::new(),
             touched: BTreeSet::new(),
             playing,
             without_room: BTreeSet::new(),
-            began: Instant::now(),
             closing: BTreeSet::new(),
             retired: BTreeSet::new(),
             deletion: Vec::new(),
@@ -434,7 +434,7 @@ impl StudyTask {
 
     /// Since the task began, by a clock that never jumps.
     fn elapsed_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
     }
 
     fn show_connected(&mut self, number: u32, connected: bool) {

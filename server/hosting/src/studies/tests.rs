@@ -248,6 +248,46 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
 #[tokio::test(start_paused = true)]
 async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
     let lab = Lab::new().await;
+/// Nobody could return meanwhile.
+#[tokio::test(start_paused = true)]
+async fn a_pause_of_the_process_drops_nobody_out() {
+    let lab = Lab::new().await;
+    let clock = Arc::clone(lab.studies.rooms().process_clock());
+    let watching = tokio::spawn(clock.watch());
+    assert_eq!(lab.open(1).await, Ok(1));
+    drop(lab.study.present(1, 1).await);
+    let mut changes = lab.study.changes();
+    while lab.study.read(|study| study.is_connected(1)) {
+        changes.changed().await.expect("the study runs");
+    }
+    lab.settled().await;
+    advance(LIMIT * 5).await;
+    lab.settled().await;
+    assert_eq!(lab.status(1), Status::Active);
+    let resumed = tokio::time::Instant::now();
+    lab.until(1, Status::DroppedOut).await;
+    assert!(resumed.elapsed() > LIMIT / 2, "{:?}", resumed.elapsed());
+    watching.abort();
+}
+
+/// A server may start before its clock is set, and machines sleep.
+#[tokio::test(start_paused = true)]
+async fn a_study_closes_at_its_date_although_the_clock_was_set_meanwhile() {
+    let days_ms = 300 * 24 * 3_600_000;
+    let settings = v1::StudySettings {
+        closes_at_ms: stopped_clock() + days_ms,
+        ..settings()
+    };
+    let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
+    let is_closed = async || {
+        tokio::time::sleep(Duration::from_secs(900)).await;
+        lab.study.read(Study::is_closed)
+    };
+    assert!(!is_closed().await);
+    AHEAD_MS.set(days_ms);
+    assert!(is_closed().await);
+}
+
     assert_eq!(lab.open(1).await, Ok(1));
     drop(lab.study.present(1, 1).await);
     let mut changes = lab.study.changes();
