@@ -1,8 +1,10 @@
 //! The task of one unit: receives messages, lets the unit decide what follows, commits it, and only
 //! then publishes it and acts on it.
 
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 
+use futures::FutureExt as _;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
@@ -31,8 +33,17 @@ pub(super) async fn run<U: Journaled>(
     mut inbox: mpsc::Receiver<U::Message>,
     stop: Stop,
 ) {
-    if let Err(error) = run_on(&mut unit, &mut inbox, stop).await {
-        fail(&mut unit, &error);
+    // A panic must leave neither streams nor a node that waits for a unit that is gone. Nothing of its
+    // state is used again.
+    let running = AssertUnwindSafe(run_on(&mut unit, &mut inbox, stop));
+    match running.catch_unwind().await {
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => fail(&mut unit, &error),
+        Err(_) => {
+            error!(id = %unit.unit().id(), "the {} panicked and stops", U::KIND);
+            report_stop(&unit);
+            unit.end_streams();
+        }
     }
     // Nothing can be sent any more, and what was sent before is given up.
     inbox.close();
@@ -65,7 +76,9 @@ async fn run_on<U: Journaled>(
         let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
         tokio::select! {
             () = stop.end.cancelled() => {
-                unit.end_streams();
+                if unit.unit().rooms.lease().is_some() {
+                    unit.end_streams();
+                }
                 return Ok(());
             }
             received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
@@ -131,10 +144,19 @@ fn fail<U: Journaled>(unit: &mut U, error: &StoreError) {
         (_, Some(_)) => warn!(%id, %error, "the {name} stops until it is resumed"),
         (_, None) => error!(%id, %error, "the store failed; the {name} stops"),
     }
+    report_stop(unit);
+    // Without a lease the whole server ends.
+    if core.rooms.lease().is_some() {
+        unit.end_streams();
+    }
+}
+
+/// Tells the node that a unit has stopped by itself.
+fn report_stop<U: Journaled>(unit: &U) {
+    let core = unit.unit();
     if let Some(lease) = core.rooms.lease()
         && !core.handle.end.is_cancelled()
     {
-        lease.report(id.unit(), UnitEvent::Stopped);
+        lease.report(core.id().unit(), UnitEvent::Stopped);
     }
-    unit.end_streams();
 }

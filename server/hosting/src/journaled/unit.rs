@@ -124,7 +124,8 @@ pub trait Journaled: Sized + Send + Sync + 'static {
     ) -> impl Future<Output = Result<bool, StoreError>> + Send;
     /// When something is due by itself.
     fn wake_at(&self) -> Option<Instant>;
-    /// Ends the streams of participants, which may reconnect, because the unit stops here.
+    /// Ends the streams of participants, which may reconnect, because the unit stops here and the server
+    /// does not.
     fn end_streams(&mut self) {}
 }
 

@@ -164,7 +164,7 @@ impl Units {
         self.runs(unit)
             || (self.rooms.by_unit(unit))
                 .is_some_and(|room| self.rooms.is_over(room.id()) == Some(true))
-            || self.tournaments.by_unit(unit).is_some()
+            || (self.tournaments.by_unit(unit)).is_some_and(|tournament| tournament.is_over())
     }
 
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the

@@ -12,8 +12,10 @@ use tokio::time::advance;
 
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
+use crate::cluster::{NodeLease, SingleServer, UnitEvent};
 use crate::journaled::ROOMS_AT_ONCE;
 use crate::studies::task::DELETION_RETRY;
+use crate::studies::message::{Command, Message};
 use chefshat_admission::limits::Key;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_record::samples;
@@ -383,6 +385,28 @@ async fn a_game_whose_room_fails_ends() {
 /// What is in the store twice is run once.
 #[tokio::test(start_paused = true)]
 async fn a_study_that_runs_is_not_resumed_beside_itself() {
+/// A node of a cluster resumes it then.
+#[tokio::test(start_paused = true)]
+async fn a_study_that_panics_is_reported_to_its_node() {
+    let store = Arc::new(MemoryStore::default());
+    let lease = Arc::new(NodeLease::new());
+    lease.set_reached();
+    lease.set(tokio::time::Instant::now() + LIMIT);
+    let (config, tracker) = (ServerConfig::default(), TaskTracker::new());
+    let (shared, held) = (Arc::new(SingleServer), Some(Arc::clone(&lease)));
+    let rooms = Rooms::of_node(&config, store, shared, held, tracker.clone()).expect("threads");
+    let studies = Studies::at(stopped_clock, rooms, tracker);
+    let (study, _) = (studies.create(settings(), None, Key::Local).await).expect("valid settings");
+    let unit = study.id().unit();
+    let created = UnitEvent::Created { ephemeral: false };
+    assert_eq!(lease.news().await, [(unit, created)].into());
+    let planted: Command = Box::new(|_: &Study, _: u64| panic!("planted"));
+    let asked = study.ask(|reply| Message::Command(planted, reply)).await;
+    assert_eq!(asked, Err(Stopped));
+    assert_eq!(lease.news().await, [(unit, UnitEvent::Stopped)].into());
+    study.stopped().await;
+}
+
     let lab = Lab::new().await;
     let id = lab.study.id();
     let stored = lab.store.unit(UnitKey::Study(id)).await.expect("readable");

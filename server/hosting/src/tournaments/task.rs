@@ -260,18 +260,11 @@ impl Journaled for TournamentTask {
             .min()
     }
 
-    fn abandon(&mut self, message: Message) {
-        if let Message::Enter(participant, _, number, connection) = message {
-            self.connections.insert(participant, (number, connection));
-            self.end_streams();
+    /// It resumes here or at another node, which does not know the stream.
         }
     }
 
-    /// They may reconnect, unless the whole server ends.
     fn end_streams(&mut self) {
-        if self.unit.rooms.lease().is_none() {
-            return;
-        }
         for (_, connection) in std::mem::take(&mut self.connections).into_values() {
             connection.outbox.end(StreamEnd::RoomGone);
         }
