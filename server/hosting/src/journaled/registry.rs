@@ -233,8 +233,8 @@ impl<U: Journaled> Registry<U> {
         };
         let rows = new.folded.rows;
         let (handle, inbox) = Handle::new(new, charged, stop.end.clone());
-        self.lock().enter(Arc::clone(&handle));
         U::enter(&handle, &self.rooms);
+        self.lock().enter(Arc::clone(&handle));
         if !handle.is_over() {
             let unit = Unit::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
             let running = actor::run(U::new(unit, &self.common), inbox, stop);
