@@ -91,15 +91,18 @@ pub fn key_or_new(data_dir: &Path) -> Result<SigningKey, KeyError> {
         return Ok(key);
     }
     let seed: [u8; 32] = rand::random();
-    create(&data_dir.join(FILE), &seed).map_err(|error| KeyError::Io(error.path, error.source))?;
-    Ok(SigningKey::from_seed(&seed))
+    match create(&data_dir.join(FILE), &seed) {
+        Ok(()) => Ok(SigningKey::from_seed(&seed)),
+        // Another process was first, unless there is no key.
+        Err(error) => key_of(data_dir)?.ok_or(KeyError::Io(error.path, error.source)),
+    }
 }
 
-/// Writes a new key file.
+/// Writes a new key file, unless there is one.
 fn create(path: &Path, seed: &[u8; 32]) -> Result<(), WriteError> {
     let mut file = AtomicFile::create_private(path)?;
     file.write_all(format!("{PREFIX}{}\n", hex::encode(seed)).as_bytes())?;
-    file.finish()
+    file.finish_new()
 }
 
 /// What the record of a game that has ended says.
@@ -213,6 +216,22 @@ mod tests {
         ] {
             let found = is_exposed(mode, user, group);
             assert_eq!(found, exposed, "{mode:o} of {user}:{group}");
+        }
+    }
+
+    #[test]
+    fn all_who_create_a_key_at_once_have_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for round in 0..20 {
+            let folder = folder.path().join(round.to_string());
+            fs::create_dir(&folder).expect("a folder");
+            let keys = std::thread::scope(|scope| {
+                let create = || key_or_new(&folder).expect("a key").public();
+                let threads = [(); 8].map(|()| scope.spawn(create));
+                threads.map(|it| it.join().expect("no panic"))
+            });
+            let kept = key_of(&folder).expect("readable").expect("a key").public();
+            assert!(keys.iter().all(|key| *key == kept), "{keys:?}, {kept:?}");
         }
     }
 
