@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 use chefshat_record::pseudonym::Named;
 use chefshat_room::ids::GameId;
-use chefshat_study::{Answer, Change, Study};
+use chefshat_study::{Answer, Change};
 use serde_json::json;
 
 use super::data::{DataError, ParticipantData};
 use super::export::Sheet;
+use crate::studies::restored;
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_store::samples::Samples;
 use chefshat_store::studies::StoredStudy;
@@ -77,8 +78,12 @@ impl ParticipantData {
     ) -> Result<(), DataError> {
         for (stored, number) in self.in_readable_studies(who, unreadable).await? {
             let id = stored.header.id;
-            let Some(study) = folded(&stored) else {
-                continue;
+            let study = match restored(&stored) {
+                Ok((_, study)) => study,
+                Err(problem) => {
+                    unreadable.push(format!("study {id} cannot be read: {problem}"));
+                    continue;
+                }
             };
             let Some(participant) = study.participant(number) else {
                 continue;
@@ -191,10 +196,51 @@ fn games_of(changes: &[Change], wanted: u32) -> Vec<GameId> {
     games.collect()
 }
 
-/// The state of a study; `None` if this version cannot read its settings.
-fn folded(stored: &StoredStudy) -> Option<Study> {
-    let plan = convert::study_plan(&stored.header.settings).ok()?;
-    let mut study = Study::new(plan.core).ok()?;
-    stored.changes.iter().for_each(|change| study.fold(change));
-    Some(study)
+#[cfg(test)]
+mod tests {
+    use chefshat_proto::v1;
+    use chefshat_room::ids::{Id, SecretHash};
+    use tokio::sync::mpsc;
+
+    use super::*;
+    use chefshat_store::MemoryStore;
+    use chefshat_store::studies::StudyHeader;
+    use chefshat_store::testing::TypedUnits as _;
+
+    #[tokio::test]
+    async fn a_study_whose_settings_cannot_be_read_is_named_in_an_export() {
+        let store = Arc::new(MemoryStore::default());
+        let header = StudyHeader {
+            id: Id::from_bytes([7; 16]),
+            // Those of a later version, say: this one knows no study without conditions.
+            settings: v1::StudySettings::default(),
+            created_at_ms: 1,
+            owner: SecretHash::of(b"owner"),
+            key: [8; 32],
+        };
+        let id = header.id;
+        store.create_study(Arc::new(header)).await.expect("stored");
+        let added = Change::Added {
+            number: 1,
+            pseudonym: "Ada".to_owned(),
+            joined: None,
+            test: false,
+            planned: None,
+        };
+        let appended = store.append_study(id, 0, vec![added]).await;
+        appended.expect("stored");
+        let data = ParticipantData::new(store, None);
+        let who = Named {
+            name: "Ada".to_owned(),
+            fingerprint: None,
+        };
+        let (sender, mut lines) = mpsc::channel(1);
+        let skipped = data.export(&who, &sender).await.expect("an export");
+        drop(sender);
+        assert_eq!(lines.recv().await, None);
+        let [problem] = &skipped.named[..] else {
+            panic!("{skipped:?}");
+        };
+        assert!(problem.contains(&id.to_string()), "{problem}");
+    }
 }

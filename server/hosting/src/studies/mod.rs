@@ -36,6 +36,7 @@ use chefshat_wire::convert::{self, StudyPlan};
 use data::{StudyData, memory_of};
 use state::{Budgets, StudyShared};
 use task::StudyTask;
+pub(crate) use task::restored;
 
 /// Why a study was not created.
 pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;

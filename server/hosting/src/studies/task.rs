@@ -498,7 +498,10 @@ fn warn_of(study: StudyId, undeleted: &Undeleted) {
 }
 
 /// The state of a stored study.
-fn restored(stored: &StoredStudy) -> Result<(StudyPlan, Study), SettingsProblem> {
+///
+/// # Errors
+/// This version cannot read its settings.
+pub(crate) fn restored(stored: &StoredStudy) -> Result<(StudyPlan, Study), SettingsProblem> {
     let plan = convert::study_plan(&stored.header.settings)?;
     let mut study = Study::new(Arc::clone(&plan.core))?;
     stored.changes.iter().for_each(|change| study.fold(change));

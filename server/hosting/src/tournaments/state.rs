@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::time::Duration;
 
 use chefshat_proto::v1;
-use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{Change, State, Tournament};
 use tokio::sync::Mutex as AsyncMutex;
 
@@ -12,8 +11,7 @@ use super::message::{Entry, JoinRefusal};
 use super::shared::{AsOf, Shared};
 use chefshat_base::clock::TimeOfDay;
 use chefshat_room::ids::{GameId, RoomId, SecretHash, TournamentToken};
-use chefshat_store::tournaments::{StoredTournament, TournamentEntry};
-use chefshat_wire::convert::{self, TournamentPlan};
+use chefshat_store::tournaments::TournamentEntry;
 
 /// Most rooms and tournaments that are over and are read at a time.
 const READ_AT_ONCE: usize = 4;
@@ -130,18 +128,6 @@ impl TournamentState {
 pub struct TournamentShared {
     pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
     pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
-}
-
-/// Restores the state of a stored tournament.
-pub(crate) fn restored(
-    stored: &StoredTournament,
-) -> Result<(TournamentPlan, TournamentState), String> {
-    let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
-        .map_err(|problem: FieldProblem| problem.to_string())?;
-    let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
-    let mut state = TournamentState::new(core);
-    stored.entries.iter().for_each(|entry| state.apply(entry));
-    Ok((plan, state))
 }
 
 /// Whole milliseconds.

@@ -10,7 +10,7 @@ use tokio::time::Instant;
 use tracing::info;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use super::state::{Common, TournamentShared, TournamentState, millis, restored};
+use super::state::{Common, TournamentShared, TournamentState, millis};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::{Rooms, Withheld};
@@ -21,7 +21,7 @@ use chefshat_room::ids::{self, RoomId, SecretHash, TournamentId, TournamentToken
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_store::units::StoredUnit;
-use chefshat_wire::convert::TournamentPlan;
+use chefshat_wire::convert::{self, TournamentPlan};
 use chefshat_wire::outbox::StreamEnd;
 
 /// When it is worth trying again to create a tournament.
@@ -100,7 +100,11 @@ impl Journaled for TournamentTask {
 
     fn fold(id: TournamentId, stored: &StoredUnit) -> Result<Folded<Self>, String> {
         let stored = StoredTournament::decode(id, stored).map_err(|problem| problem.to_string())?;
-        let (plan, state) = restored(&stored)?;
+        let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
+            .map_err(|problem| problem.to_string())?;
+        let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
+        let mut state = TournamentState::new(core);
+        stored.entries.iter().for_each(|entry| state.apply(entry));
         Ok(Folded {
             header: stored.header,
             plan,
@@ -261,6 +265,9 @@ impl Journaled for TournamentTask {
     }
 
     /// It resumes here or at another node, which does not know the stream.
+    fn abandon(&mut self, message: Message) {
+        if let Message::Enter(_, _, _, connection) = message {
+            connection.outbox.end(StreamEnd::RoomGone);
         }
     }
 
