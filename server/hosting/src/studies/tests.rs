@@ -7,15 +7,16 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use chefshat_study::{Answer, At, ItemAnswer, NewParticipants, ParticipantLink, Refusal, Status};
+use futures::FutureExt as _;
 use tokio::sync::mpsc;
 use tokio::time::advance;
 
 use super::*;
-use crate::config::{MAX_STUDIES, ServerConfig};
 use crate::cluster::{NodeLease, SingleServer, UnitEvent};
+use crate::config::{MAX_STUDIES, ServerConfig};
 use crate::journaled::ROOMS_AT_ONCE;
-use crate::studies::task::DELETION_RETRY;
 use crate::studies::message::{Command, Message};
+use crate::studies::task::DELETION_RETRY;
 use chefshat_admission::limits::Key;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_record::samples;
@@ -247,9 +248,6 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     assert_eq!(lab.status(1), Status::DroppedOut);
 }
 
-#[tokio::test(start_paused = true)]
-async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
-    let lab = Lab::new().await;
 /// Nobody could return meanwhile.
 #[tokio::test(start_paused = true)]
 async fn a_pause_of_the_process_drops_nobody_out() {
@@ -290,6 +288,9 @@ async fn a_study_closes_at_its_date_although_the_clock_was_set_meanwhile() {
     assert!(is_closed().await);
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
+    let lab = Lab::new().await;
     assert_eq!(lab.open(1).await, Ok(1));
     drop(lab.study.present(1, 1).await);
     let mut changes = lab.study.changes();
@@ -382,9 +383,6 @@ async fn a_game_whose_room_fails_ends() {
     assert_eq!(outcome, Some(chefshat_study::Outcome::Aborted));
 }
 
-/// What is in the store twice is run once.
-#[tokio::test(start_paused = true)]
-async fn a_study_that_runs_is_not_resumed_beside_itself() {
 /// A node of a cluster resumes it then.
 #[tokio::test(start_paused = true)]
 async fn a_study_that_panics_is_reported_to_its_node() {
@@ -407,6 +405,9 @@ async fn a_study_that_panics_is_reported_to_its_node() {
     study.stopped().await;
 }
 
+/// What is in the store twice is run once.
+#[tokio::test(start_paused = true)]
+async fn a_study_that_runs_is_not_resumed_beside_itself() {
     let lab = Lab::new().await;
     let id = lab.study.id();
     let stored = lab.store.unit(UnitKey::Study(id)).await.expect("readable");
@@ -434,6 +435,9 @@ async fn samples_that_cannot_be_deleted_stop_no_study_and_are_tried_again() {
     let withdraw = || lab.study.withdraw(1, true);
     assert_eq!(withdraw().await, Err(NotDone::Files));
     assert_eq!(lab.open(2).await, Ok(1), "the others go on");
+    let before = tokio::time::Instant::now();
+    assert_eq!(lab.study.withdraw(2, true).await, Ok(()));
+    assert!(before.elapsed() < DELETION_RETRY, "and wait for nobody");
     let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
     assert_eq!(delete().await, Err(NotDeleted::Files(1)));
 
@@ -499,9 +503,6 @@ async fn a_study_is_deleted_at_its_date_and_not_when_the_clock_jumps() {
     let other = lab.studies.create(settings(), None, Key::Local).await;
     let other = other.expect("valid settings").0;
     let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
-    let before = tokio::time::Instant::now();
-    assert_eq!(lab.study.withdraw(2, true).await, Ok(()));
-    assert!(before.elapsed() < DELETION_RETRY, "and wait for nobody");
     let is_there = |id| lab.studies.get(id).is_some();
     assert_eq!(lab.open(1).await, Ok(1));
     let present = lab.study.present(1, 1).await;
@@ -534,6 +535,43 @@ async fn a_study_is_deleted_at_its_date_and_not_when_the_clock_jumps() {
         refused.to_string().starts_with("deletes_at_ms: "),
         "{refused}"
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_that_could_not_be_deleted_at_its_date_is_tried_again_however_late_that_is() {
+    const HOUR: Duration = Duration::from_secs(3_600);
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    let dated = v1::StudySettings {
+        deletes_at_ms: stopped_clock() + 1_000,
+        ..settings()
+    };
+    let lab = Lab::with(&config, dated, 2).await;
+    let present = lab.begin().await;
+    let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
+    let game = convert::game_of(&game).to_string();
+    let stuck = samples::path_of(folder.path(), &game, 0);
+    std::fs::create_dir_all(&stuck).expect("created");
+    // Its task waits for what is being written, longer than it is waited for.
+    let writing = Arc::clone(&lab.study.shared.traces).lock_owned().await;
+    let study = Arc::clone(&lab.study);
+    let withdrawing = tokio::spawn(async move { study.withdraw(2, true).await });
+    let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
+    tokio::time::sleep(2 * HOUR).await;
+    drop((writing, present));
+    withdrawing.await.expect("no panic").expect("withdrawn");
+    tokio::time::sleep(HOUR).await;
+    assert!(
+        lab.studies.get(lab.study.id()).is_some(),
+        "samples are left"
+    );
+    std::fs::remove_dir(&stuck).expect("removed");
+    tokio::time::sleep(HOUR).await;
+    assert!(lab.studies.get(lab.study.id()).is_none());
+    deleting.abort();
 }
 
 #[tokio::test(start_paused = true)]
@@ -604,43 +642,6 @@ async fn all_who_wait_for_rooms_get_them_after_a_restart_and_a_taken_id_ends_one
     let other = GameHeader {
         game_id: convert::game_of(&placed(&lab.study, TAKEN)),
         ..GameHeader::clone(&header(9, Durability::Ephemeral))
-#[tokio::test(start_paused = true)]
-async fn a_study_that_could_not_be_deleted_at_its_date_is_tried_again_however_late_that_is() {
-    const HOUR: Duration = Duration::from_secs(3_600);
-    let folder = tempfile::tempdir().expect("a folder");
-    let config = ServerConfig {
-        data_dir: Some(folder.path().to_path_buf()),
-        ..ServerConfig::default()
-    };
-    let dated = v1::StudySettings {
-        deletes_at_ms: stopped_clock() + 1_000,
-        ..settings()
-    };
-    let lab = Lab::with(&config, dated, 2).await;
-    let present = lab.begin().await;
-    let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
-    let game = convert::game_of(&game).to_string();
-    let stuck = samples::path_of(folder.path(), &game, 0);
-    std::fs::create_dir_all(&stuck).expect("created");
-    // Its task waits for what is being written, longer than it is waited for.
-    let writing = Arc::clone(&lab.study.shared.traces).lock_owned().await;
-    let study = Arc::clone(&lab.study);
-    let withdrawing = tokio::spawn(async move { study.withdraw(2, true).await });
-    let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
-    tokio::time::sleep(2 * HOUR).await;
-    drop((writing, present));
-    withdrawing.await.expect("no panic").expect("withdrawn");
-    tokio::time::sleep(HOUR).await;
-    assert!(
-        lab.studies.get(lab.study.id()).is_some(),
-        "samples are left"
-    );
-    std::fs::remove_dir(&stuck).expect("removed");
-    tokio::time::sleep(HOUR).await;
-    assert!(lab.studies.get(lab.study.id()).is_none());
-    deleting.abort();
-}
-
     };
     let created = lab.store.create(Arc::new(other), Vec::new()).await;
     let _held = created.expect("its id is free");
@@ -741,8 +742,29 @@ async fn a_record_from_elsewhere_is_no_data_of_a_study() {
     let summary = v1::RecordSummary::default();
     let imported = lab.store.import(game, summary, Arc::from([])).await;
     assert_eq!(imported, Ok(true));
-    let record = super::export::record_of(lab.studies.rooms(), lab.study.id(), game).await;
+    let record = super::export::record_of(&lab.study, lab.studies.rooms(), game).await;
     assert_eq!(record, Ok(None));
+}
+
+#[tokio::test]
+async fn an_export_reads_records_in_turn_with_others() {
+    let (lab, failing) = Lab::failing(tests(1)).await;
+    let (rooms, game) = (lab.studies.rooms(), GameId::from_bytes([9; 16]));
+    let imported = lab
+        .store
+        .import(game, v1::RecordSummary::default(), Arc::from([]));
+    assert_eq!(imported.await, Ok(true));
+    let mut slices = Vec::new();
+    while let Some(slice) = rooms.background().slice(Key::Resumed).now_or_never() {
+        slices.push(slice);
+    }
+    failing.take_reads();
+    let mut reading = Box::pin(super::export::record_of(&lab.study, rooms, game));
+    assert_eq!(reading.as_mut().now_or_never(), None);
+    assert!(failing.take_reads().is_empty(), "others compute");
+    drop(slices);
+    assert_eq!(reading.await, Ok(None));
+    assert_eq!(failing.take_reads().len(), 1);
 }
 
 /// The rows of exported tables, without those of records, each by the names of its columns.
@@ -1049,6 +1071,33 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         .map(|row| cells(row, &["participant", "test"]))
         .collect();
     assert_eq!(tests, ["T05|true"]);
+}
+
+#[tokio::test]
+async fn samples_that_cannot_be_read_end_no_export() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    let lab = Lab::of(&config).await;
+    let game = GameId::from_bytes([9; 16]);
+    let [stuck, other] =
+        [0, 1].map(|seat| samples::path_of(folder.path(), &game.to_string(), seat));
+    // A folder can be opened, and not read.
+    std::fs::create_dir_all(&stuck).expect("created");
+    std::fs::write(&other, "samples").expect("written");
+    let (sender, mut receiver) = mpsc::channel(9);
+    let sent = super::export::samples(lab.studies.rooms(), game, &sender).await;
+    let name = |path: &std::path::Path| path.file_name().expect("a name").display().to_string();
+    let problem = sent.expect("somebody receives").expect("one is left out");
+    assert!(problem.contains(&name(&stuck)), "{problem}");
+    drop(sender);
+    let mut files = BTreeMap::new();
+    while let Some(ExportedFile { file, data }) = receiver.recv().await {
+        files.insert(file, data);
+    }
+    assert_eq!(files[&format!("samples/{}", name(&other))], b"samples");
 }
 
 #[tokio::test]

@@ -579,11 +579,11 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         .empty(NO_RESULT)
 }
 
-/// A game whose record cannot be read, and why.
+/// A game whose record or samples cannot be read, and why.
 pub(super) fn unreadable() -> Table<(GameId, String)> {
     Table::new(
         "unreadable.csv",
-        "a game whose record cannot be read",
+        "a game whose record or samples cannot be read",
         &["game_id"],
     )
     .with(
@@ -595,7 +595,7 @@ pub(super) fn unreadable() -> Table<(GameId, String)> {
     .with(
         "problem",
         Kind::Text,
-        "why its record cannot be read",
+        "why they cannot be read",
         |(_, problem)| problem.clone(),
     )
 }

@@ -20,7 +20,7 @@ use tracing::error;
 use super::handle::StudyHandle;
 use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
-use chefshat_room::ids::{GameId, StudyId};
+use chefshat_room::ids::GameId;
 use chefshat_store::{StoreError, StoredGame};
 use chefshat_wire::convert;
 use columns::{CodebookRow, GameResult, GameRow, GroupRow, ParticipantRow, SessionRow, TraceRow};
@@ -314,7 +314,7 @@ async fn games(
                 continue;
             }
             let id = convert::game_of(&game.placed);
-            let lines = match record_of(rooms, handle.id(), id).await {
+            let lines = match record_of(handle, rooms, id).await {
                 // One game that cannot be read ends no export of the others.
                 Err(StoreError::Unreadable(problem)) => {
                     error!(study = %handle.id(), %problem, "a game is left out of an export");
@@ -339,15 +339,8 @@ async fn games(
         }
     }
     let mut sheets = vec![file.end().await?];
-    if !unreadable.is_empty() {
-        let mut file = TableFile::new(columns::unreadable(), sender).await?;
-        for row in unreadable {
-            file.row(&row).await?;
-        }
-        sheets.push(file.end().await?);
-    }
     for game in records {
-        let lines = match record_of(rooms, handle.id(), game).await {
+        let lines = match record_of(handle, rooms, game).await {
             // It could be read a moment ago.
             Err(StoreError::Unreadable(_)) => None,
             lines => lines?,
@@ -362,58 +355,81 @@ async fn games(
             file.line(&json).await?;
         }
         file.end().await?;
-        samples(rooms, game, sender).await?;
+        let problem = samples(rooms, game, sender).await?;
+        unreadable.extend(problem.map(|problem| (game, problem)));
+    }
+    if !unreadable.is_empty() {
+        let mut file = TableFile::new(columns::unreadable(), sender).await?;
+        for row in unreadable {
+            file.row(&row).await?;
+        }
+        sheets.push(file.end().await?);
     }
     Ok(sheets)
 }
 
-/// The samples of a game's seats, in files that `chefshat export` finds beside the records.
-async fn samples(
+/// The samples of a game's seats, in files that `chefshat export` finds beside the records. Returns why
+/// some cannot be read: no reason to leave out the others.
+pub(super) async fn samples(
     rooms: &Rooms,
     game: GameId,
     sender: &mpsc::Sender<ExportedFile>,
-) -> Result<(), ExportError> {
-    let failed = |error: io::Error| StoreError::Failed(format!("reading samples failed: {error}"));
+) -> Result<Option<String>, ExportError> {
+    let mut problem = None;
     for path in rooms.samples().files(game) {
         let Some(name) = path.file_name().and_then(|it| it.to_str()) else {
             continue;
         };
+        let left_out = |error: io::Error| {
+            error!(path = %path.display(), %error, "samples are left out of an export");
+            Some(format!("samples/{name}: {error}"))
+        };
         let mut file = File::new(format!("samples/{name}"), sender);
         let mut stored = match tokio::fs::File::open(&path).await {
             Ok(stored) => stored,
-            // They have been deleted since, or the disk fails: no reason to leave out the others.
             Err(error) => {
-                error!(path = %path.display(), %error, "samples are left out of an export");
+                problem = left_out(error);
                 continue;
             }
         };
-        while stored.read_buf(&mut file.buffer).await.map_err(failed)? > 0 {
-            file.send_full().await?;
+        loop {
+            match stored.read_buf(&mut file.buffer).await {
+                Ok(0) => break,
+                Ok(_) => file.send_full().await?,
+                Err(error) => {
+                    problem = left_out(error);
+                    break;
+                }
+            }
         }
         file.end().await?;
     }
-    Ok(())
+    Ok(problem)
 }
 
-/// The record of a game of this study. A record from elsewhere that has the game's id is none.
+/// The record of a game of this study, in turn among long computations. A record from elsewhere that has
+/// the game's id is none.
 pub(super) async fn record_of(
+    handle: &StudyHandle,
     rooms: &Rooms,
-    study: StudyId,
     game: GameId,
 ) -> Result<Option<Vec<v1::RecordLine>>, StoreError> {
+    let background = rooms.background();
+    // Before it is read: the record of a long game takes much time and memory.
+    let _slice = background.slice(handle.charged).await;
     let Some(stored) = rooms.store().finished(game).await? else {
         return Ok(None);
     };
     let is_own = match &stored {
         StoredGame::Hosted(header, ..) => {
-            (header.study.as_ref()).is_some_and(|game| game.study == study)
+            (header.study.as_ref()).is_some_and(|game| game.study == handle.id())
         }
         StoredGame::Imported(_) => false,
     };
     if !is_own {
         return Ok(None);
     }
-    let reading = rooms.background().run(move || stored.lines().into_owned());
+    let reading = background.run(move || stored.lines().into_owned());
     let lines = reading.await;
     (lines.map(Some))
         .ok_or_else(|| StoreError::Unreadable(format!("the record of game {game} cannot be made")))
