@@ -25,6 +25,7 @@ use tokio::time::{Instant, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tonic::body::Body;
+use tonic::server::NamedService;
 use tonic::service::{LayerExt as _, Routes};
 use tonic::transport;
 use tonic::transport::server::Connected;
@@ -98,6 +99,20 @@ pub enum ServeError {
     /// A setting is not a web origin.
     #[error("{0:?} is not a web origin; an example is https://example.org")]
     Origin(String),
+}
+
+/// A service behind its server, which accepts no longer message than the longest of its calls. The layer
+/// of `grpc/decoding.rs` refuses those of each call before they are read.
+macro_rules! served {
+    ($server:ident, $service:expr) => {{
+        let server = $server::new($service);
+        let longest = Call::longest_message_of(name_of(&server));
+        server.max_decoding_message_size(longest)
+    }};
+}
+
+fn name_of<S: NamedService>(_: &S) -> &'static str {
+    S::NAME
 }
 
 /// Resumes the games of a store and serves on a socket until `shutdown` completes and everything
@@ -259,7 +274,7 @@ impl Server {
         }
     }
 
-    /// Number of resumed games and of tournament games that are still to be played.
+    /// Number of resumed games.
     pub fn games(&self) -> usize {
         self.games
     }
@@ -425,8 +440,7 @@ impl Server {
             None => Either::Left(std::future::ready(Ok(()))),
             Some((port, to_others)) => {
                 let of_nodes = grpc::OfNodes::new(play, directory, to_others);
-                let of_nodes = PeerServiceServer::new(of_nodes)
-                    .max_decoding_message_size(longest("chefshat.peer.v1.PeerService"));
+                let of_nodes = served!(PeerServiceServer, of_nodes);
                 let closed = closing.clone();
                 Either::Right(
                     transport::Server::builder()
@@ -577,12 +591,6 @@ fn from_peer(mut request: http::Request<Body>) -> http::Request<Body> {
     request
 }
 
-/// The longest message of a service. The layer of `grpc/decoding.rs` refuses those of each call
-/// before they are read; this is what the transport itself accepts.
-fn longest(service: &str) -> usize {
-    Call::longest_message_of(service)
-}
-
 fn routes(
     rooms: &Arc<Rooms>,
     (tournaments, studies): (&Arc<Tournaments>, &Arc<Studies>),
@@ -627,78 +635,37 @@ fn routes(
     );
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
-    let routes = Routes::new(
-        PlayServiceServer::new(grpc::Play::new(
-            Arc::clone(rooms),
-            Arc::clone(tournaments),
-            closing.clone(),
-        ))
-        .max_decoding_message_size(longest("chefshat.v1.PlayService")),
-    )
-    .add_service(
-        TournamentServiceServer::new(grpc::TournamentCalls::new(
-            Arc::clone(tournaments),
-            recorded.clone(),
-            Arc::clone(calls),
-            closing.clone(),
-        ))
-        .max_decoding_message_size(longest("chefshat.v1.TournamentService")),
-    )
-    .add_service(
-        StudyServiceServer::new(study_calls.clone())
-            .max_decoding_message_size(longest("chefshat.v1.StudyService")),
-    )
-    .add_service(
-        ParticipationServiceServer::new(study_calls)
-            .max_decoding_message_size(longest("chefshat.v1.ParticipationService")),
-    )
-    .add_service(
-        RoomServiceServer::new(grpc::RoomCalls::new(
-            Arc::clone(rooms),
-            recorded.clone(),
-            Arc::clone(calls),
-            config.client_endpoint.as_deref(),
-        ))
-        .max_decoding_message_size(longest("chefshat.v1.RoomService")),
-    )
-    .add_service(
-        SpectatorServiceServer::new(grpc::Spectate::new(lookup.clone(), closing.clone()))
-            .max_decoding_message_size(longest("chefshat.v1.SpectatorService")),
-    )
-    .add_service(
-        TableServiceServer::new(grpc::TableCalls::new(lookup.clone()))
-            .max_decoding_message_size(longest("chefshat.v1.TableService")),
-    )
-    .add_service(
-        InstrumentServiceServer::new(grpc::Instruments::new(lookup.clone()))
-            .max_decoding_message_size(longest("chefshat.v1.InstrumentService")),
-    )
-    .add_service(
-        RecordServiceServer::new(grpc::Records::new(
-            recorded,
-            Arc::clone(tournaments),
-            config,
-            closing.clone(),
-        ))
-        .max_decoding_message_size(longest("chefshat.v1.RecordService")),
-    )
-    .add_service(
-        VectorServiceServer::new(vectors)
-            .max_decoding_message_size(longest("chefshat.v1.VectorService")),
-    )
-    .add_service(
-        AnalysisServiceServer::new(analyses)
-            .max_decoding_message_size(longest("chefshat.v1.AnalysisService")),
-    )
-    .add_service(
-        AdminServiceServer::new(admin)
-            .max_decoding_message_size(longest("chefshat.v1.AdminService")),
-    )
-    .add_service(
-        ServerServiceServer::new(grpc::Info::new(lookup, calls, config))
-            .max_decoding_message_size(longest("chefshat.v1.ServerService")),
+    let play = grpc::Play::new(Arc::clone(rooms), Arc::clone(tournaments), closing.clone());
+    let tournament_calls = grpc::TournamentCalls::new(
+        Arc::clone(tournaments),
+        recorded.clone(),
+        Arc::clone(calls),
+        closing.clone(),
     );
-    Ok(routes)
+    let room_calls = grpc::RoomCalls::new(
+        Arc::clone(rooms),
+        recorded.clone(),
+        Arc::clone(calls),
+        config.client_endpoint.as_deref(),
+    );
+    let spectate = grpc::Spectate::new(lookup.clone(), closing.clone());
+    let tables = grpc::TableCalls::new(lookup.clone());
+    let instruments = grpc::Instruments::new(lookup.clone());
+    let records = grpc::Records::new(recorded, Arc::clone(tournaments), config, closing.clone());
+    let info = grpc::Info::new(lookup, calls, config);
+    Ok(Routes::new(served!(PlayServiceServer, play))
+        .add_service(served!(TournamentServiceServer, tournament_calls))
+        .add_service(served!(StudyServiceServer, study_calls.clone()))
+        .add_service(served!(ParticipationServiceServer, study_calls))
+        .add_service(served!(RoomServiceServer, room_calls))
+        .add_service(served!(SpectatorServiceServer, spectate))
+        .add_service(served!(TableServiceServer, tables))
+        .add_service(served!(InstrumentServiceServer, instruments))
+        .add_service(served!(RecordServiceServer, records))
+        .add_service(served!(VectorServiceServer, vectors))
+        .add_service(served!(AnalysisServiceServer, analyses))
+        .add_service(served!(AdminServiceServer, admin))
+        .add_service(served!(ServerServiceServer, info)))
 }
 
 fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<
