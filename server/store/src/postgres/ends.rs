@@ -8,7 +8,7 @@ use sqlx::query::Query;
 use sqlx::{Postgres, Row as _};
 
 use super::appends::refusal;
-use super::values::{Owned, text};
+use super::values::{Owned, indexed_name, text};
 use super::writer::confirming;
 use crate::StoreError;
 use crate::form::FORM;
@@ -277,7 +277,10 @@ fn with_summary<'q>(
     };
     let seats = &summary.seats;
     let column = |value: fn(&v1::Participant) -> &str| -> Vec<String> {
-        seats.iter().map(|seat| text(value(seat)).into()).collect()
+        seats
+            .iter()
+            .map(|seat| indexed_name(value(seat)).into())
+            .collect()
     };
     query
         .bind(summary.state)

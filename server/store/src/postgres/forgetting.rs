@@ -10,7 +10,7 @@ use sqlx::postgres::PgRow;
 use super::PostgresStore;
 use super::commands::Command;
 use super::forget::GAMES_AT_A_TIME;
-use super::values::text;
+use super::values::indexed_name;
 use crate::StoreError;
 use crate::decode_pool::DecodePool;
 use crate::forget::{GameRows, Rewritable, Rewrite};
@@ -28,7 +28,7 @@ impl Rewritable for PostgresStore {
         let mut games = Vec::new();
         let mut after = 0;
         while after < last.unwrap_or_default() {
-            let (bytes, name) = (name.as_bytes().to_vec(), text(name).into_owned());
+            let (bytes, name) = (name.as_bytes().to_vec(), indexed_name(name).into_owned());
             let found = self.reader.read(|connection| {
                 sqlx::query_scalar(
                     "SELECT number FROM games WHERE number > $1 AND number <= $2 AND (

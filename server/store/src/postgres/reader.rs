@@ -16,7 +16,7 @@ use tracing::error;
 
 use super::errors::failure;
 use super::retained::{divided, old};
-use super::values::text;
+use super::values::{indexed_name, text};
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::sql::{MAX_PRUNABLE_READ, integer, list_query};
@@ -273,7 +273,7 @@ impl Reader {
             .bind(integer(filter.created_from_ms))
             .bind(integer(filter.created_before_ms))
             .bind(filter.kind)
-            .bind(text(&filter.participant).into_owned())
+            .bind(indexed_name(&filter.participant).into_owned())
             .bind(filter.hosted_here)
             .bind(integer(count as u64))
             .bind(OWNER_WITHIN);

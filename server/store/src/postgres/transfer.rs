@@ -11,7 +11,7 @@ use tracing::error;
 use super::errors::{failure, is_temporary};
 use super::open::{self, DatabaseError};
 use super::partitions;
-use super::values::{FIRST_EPOCH, text};
+use super::values::{FIRST_EPOCH, indexed_name, text};
 use crate::form;
 use crate::sql::integer;
 use crate::sqlite::{
@@ -406,12 +406,12 @@ async fn insert_participants(
     .bind(rows.iter().map(|row| row.seat).collect::<Vec<_>>())
     .bind(
         (rows.iter())
-            .map(|row| text(&row.name).into_owned())
+            .map(|row| indexed_name(&row.name).into_owned())
             .collect::<Vec<_>>(),
     )
     .bind(
         (rows.iter())
-            .map(|row| text(&row.agent).into_owned())
+            .map(|row| indexed_name(&row.agent).into_owned())
             .collect::<Vec<_>>(),
     )
     .bind(rows.iter().map(|row| row.kind).collect::<Vec<_>>())

@@ -11,6 +11,9 @@ use chefshat_room::ids::UnitId;
 /// The epoch of what has just been created.
 pub(super) const FIRST_EPOCH: i64 = 1;
 
+/// Most bytes of a name by which games are found: an index takes no long ones.
+const MAX_INDEXED_NAME: usize = 512;
+
 /// The number of rooms in the column `kind` of what nodes own.
 pub(super) const ROOM: i16 = 0;
 /// That of tournaments.
@@ -61,4 +64,10 @@ pub(super) fn text(text: &str) -> Cow<'_, str> {
         true => text.replace('\0', "\u{fffd}").into(),
         false => text.into(),
     }
+}
+
+/// A name by which games are found, as the database takes it: the beginning of a long one, as an
+/// imported record may have.
+pub(super) fn indexed_name(name: &str) -> Cow<'_, str> {
+    text(&name[..name.floor_char_boundary(MAX_INDEXED_NAME)])
 }

@@ -1,5 +1,8 @@
 //! Lists of finished games: filtered, page by page, in both orders.
 
+use chefshat_record::pseudonym::Named;
+use chefshat_room::ids::random_bytes;
+
 use super::*;
 
 #[tokio::test]
@@ -29,6 +32,42 @@ fn with_seats(header: &GameHeader) -> Box<v1::RecordSummary> {
         seats,
         ..*summary(header)
     })
+}
+
+/// Imported records may have any name, and one that does not compress fits no index of PostgreSQL.
+#[tokio::test]
+async fn a_game_is_found_by_a_name_of_any_length() {
+    with_each_store(async |store| {
+        let name = hex::encode(random_bytes::<8_192>());
+        let header = header(1, Durability::Durable);
+        let mut summary = with_seats(&header);
+        summary.seats[0].name.clone_from(&name);
+        let record: Arc<[v1::RecordLine]> = Arc::from([v1::RecordLine {
+            line: Some(v1::record_line::Line::Header(Box::new(v1::RecordHeader {
+                seats: summary.seats.clone(),
+                ..v1::RecordHeader::default()
+            }))),
+        }]);
+        let imported = store.import(header.game_id, *summary, record).await;
+        assert_eq!(imported, Ok(true));
+        let filter = v1::RecordFilter {
+            participant: name.clone(),
+            ..v1::RecordFilter::default()
+        };
+        let listed = store.list(&filter, Part::FROM_OLDEST, 9).await;
+        assert_eq!(listed.expect("readable").len(), 1);
+        let who = Pseudonym {
+            of: Named {
+                name,
+                fingerprint: None,
+            },
+            pseudonym: "deleted 1".into(),
+            key: None,
+        };
+        let forgotten = store.forget(&who).await.expect("it is over");
+        assert_eq!(forgotten.games, [header.game_id]);
+    })
+    .await;
 }
 
 async fn check(store: &dyn Store) {

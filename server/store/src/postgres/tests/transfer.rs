@@ -189,6 +189,26 @@ async fn a_folder_whose_move_has_no_answer_is_used_by_no_server() {
 }
 
 #[tokio::test]
+async fn a_name_that_no_index_takes_does_not_prevent_a_move() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = sqlite(folder.path()).await;
+    let long = v1::RecordSummary {
+        seats: vec![v1::Participant {
+            name: hex::encode(random_bytes::<8_192>()),
+            ..v1::Participant::default()
+        }],
+        ..*summary(1)
+    };
+    let imported = source.import(Id::from_bytes([1; 16]), long, Arc::from([]));
+    assert_eq!(imported.await, Ok(true));
+    source.close().await;
+    drop(source);
+    let database = chefshat_postgres::database();
+    let moved = transfer(folder.path(), database.url(), |_, _| {}).await;
+    assert_eq!(moved.expect("it moves").finished, 1);
+}
+
+#[tokio::test]
 async fn a_move_that_fails_moves_nothing() {
     let folder = earlier_version();
     let database = chefshat_postgres::database();
