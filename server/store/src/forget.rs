@@ -14,7 +14,7 @@ use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 
 use super::decode_pool::DecodePool;
-use super::form::{self, Unreadable};
+use super::form::{self, Unreadable, check_form};
 use super::tournaments::TournamentEntry;
 use super::{ForgetError, Forgotten, StoreError, StoredGame};
 use chefshat_room::ids::GameId;
@@ -28,14 +28,15 @@ const ENOUGH_BYTES: usize = 1024 * 1024;
 /// A database from which a participant is removed.
 #[async_trait]
 pub(super) trait Rewritable: Sync {
-    /// The numbers of the games that may contain a name.
+    /// The numbers of the games that may contain a name. Only the headers of games that are not over
+    /// are searched: whom others name is among their participants.
     async fn games_with(&self, name: &str) -> Result<Vec<i64>, StoreError>;
     /// The numbers of the tournaments that may contain a name.
     async fn tournaments_with(&self, name: &str) -> Result<Vec<i64>, StoreError>;
     /// The rows of a game; `None` if it was deleted.
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError>;
-    /// The rows of a tournament's journal by their positions, in order.
-    async fn tournament_rows(&self, number: i64) -> Result<Vec<(i64, Vec<u8>)>, StoreError>;
+    /// The rows of a tournament's journal, in order.
+    async fn tournament_rows(&self, number: i64) -> Result<Vec<TournamentRow>, StoreError>;
     /// Writes what changes in one transaction.
     async fn write(&self, rewrite: Rewrite) -> Result<(), StoreError>;
     /// Where games are decoded.
@@ -134,6 +135,8 @@ async fn commit(
 pub(super) struct GameRows {
     pub(super) number: i64,
     pub(super) id: GameId,
+    /// The version of the encoding.
+    pub(super) form: i64,
     pub(super) is_running: bool,
     pub(super) is_filed: bool,
     pub(super) header: Option<Vec<u8>>,
@@ -145,6 +148,10 @@ pub(super) struct GameRows {
     /// The rows of its journal by their keys, in order.
     pub(super) journal: Vec<(i64, Vec<u8>)>,
 }
+
+/// A row of a tournament's journal: the version of the tournament's encoding, its position and its
+/// entries.
+pub(super) type TournamentRow = (i64, i64, Vec<u8>);
 
 /// The rows of a game that are written again.
 #[derive(Debug)]
@@ -220,18 +227,19 @@ impl Rewrite {
         Ok(self)
     }
 
-    /// Adds the rows of a tournament, by their positions, if the participant is in it.
+    /// Adds the rows of a tournament, if the participant is in it.
     ///
     /// # Errors
     /// The tournament is not over, or cannot be read.
     fn with_tournament(
         mut self,
         number: i64,
-        rows: Vec<(i64, Vec<u8>)>,
+        rows: Vec<TournamentRow>,
     ) -> Result<Self, ForgetError> {
         let (mut changed, mut is_over) = (Vec::new(), false);
-        for (position, bytes) in rows {
-            let read = form::tournament_entries_from_bytes(&bytes);
+        for (form, position, bytes) in rows {
+            let known = check_form(form);
+            let read = known.and_then(|()| form::tournament_entries_from_bytes(&bytes));
             let mut entries = read.map_err(|problem| ForgetError::Unreadable {
                 what: format!("tournament number {number}"),
                 problem: problem.to_string(),
@@ -355,6 +363,8 @@ fn rewrite_game(
     rows: GameRows,
     who: &Pseudonym,
 ) -> Result<Option<(GameRewrite, Redactions)>, Unreadable> {
+    // What this version does not know would be lost.
+    check_form(rows.form)?;
     let mut game = GameRewrite {
         number: rows.number,
         header: None,

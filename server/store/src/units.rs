@@ -71,6 +71,11 @@ pub(super) const HEADER: &str = "SELECT number, form, header FROM {units} WHERE 
 /// The rows of a unit, by its number.
 pub(super) const ROWS: &str = "SELECT {entries} FROM {rows} WHERE {unit} = $1 ORDER BY position";
 
+/// The rows of a tournament with their positions, and the version of its encoding, by its number.
+pub(super) const TOURNAMENT_ROWS: &str = "SELECT form, position, entries
+     FROM tournaments JOIN tournament_entries ON tournament = number
+     WHERE number = $1 ORDER BY position";
+
 /// A kind of id that stores know: of tournaments or of studies.
 pub trait StoredKind: IsUnit + Sized + 'static {
     /// The kind.

@@ -13,7 +13,8 @@ use super::forget::GAMES_AT_A_TIME;
 use super::values::indexed_name;
 use crate::StoreError;
 use crate::decode_pool::DecodePool;
-use crate::forget::{GameRows, Rewritable, Rewrite};
+use crate::forget::{GameRows, Rewritable, Rewrite, TournamentRow};
+use crate::units::TOURNAMENT_ROWS;
 use chefshat_room::ids::Id;
 
 #[async_trait]
@@ -34,7 +35,8 @@ impl Rewritable for PostgresStore {
                     "SELECT number FROM games WHERE number > $1 AND number <= $2 AND (
                          number IN (SELECT game FROM participants WHERE name = $3)
                          OR EXISTS (SELECT FROM journal WHERE game = number AND position($4 IN entries) > 0)
-                         OR EXISTS (SELECT FROM added_records WHERE game = number AND position($4 IN record) > 0))
+                         OR EXISTS (SELECT FROM added_records WHERE game = number AND position($4 IN record) > 0)
+                         OR state = 0 AND position($4 IN header) > 0)
                      ORDER BY number",
                 )
                 .bind(after)
@@ -66,7 +68,7 @@ impl Rewritable for PostgresStore {
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let game: Option<PgRow> = (self.reader.read(|connection| {
             sqlx::query(
-                "SELECT game_id, state, filed, header, summary, record, signature
+                "SELECT game_id, state, filed, header, summary, record, signature, form
                  FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
             )
             .bind(number)
@@ -90,6 +92,7 @@ impl Rewritable for PostgresStore {
         Ok(Some(GameRows {
             number,
             id,
+            form: game.get(7),
             is_running: game.get::<i32, _>(1) == 0,
             is_filed: game.get(2),
             header: game.get(3),
@@ -100,14 +103,12 @@ impl Rewritable for PostgresStore {
         }))
     }
 
-    async fn tournament_rows(&self, number: i64) -> Result<Vec<(i64, Vec<u8>)>, StoreError> {
+    async fn tournament_rows(&self, number: i64) -> Result<Vec<TournamentRow>, StoreError> {
         let rows = self.reader.read(|connection| {
-            sqlx::query_as(
-                "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-            )
-            .bind(number)
-            .fetch_all(connection)
-            .boxed()
+            sqlx::query_as(TOURNAMENT_ROWS)
+                .bind(number)
+                .fetch_all(connection)
+                .boxed()
         });
         rows.await
     }

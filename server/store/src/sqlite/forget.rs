@@ -14,7 +14,8 @@ use super::rows::with_own_rows;
 use super::writer::WriteCommand;
 use crate::StoreError;
 use crate::decode_pool::DecodePool;
-use crate::forget::{GameRows, Rewritable, Rewrite};
+use crate::forget::{GameRows, Rewritable, Rewrite, TournamentRow};
+use crate::units::TOURNAMENT_ROWS;
 use chefshat_room::ids::Id;
 
 impl SqliteStore {
@@ -46,7 +47,9 @@ impl Rewritable for SqliteStore {
             "SELECT number FROM games
              WHERE number IN (SELECT game FROM participants WHERE name = $1
                               UNION SELECT game FROM journal WHERE instr(entries, CAST($1 AS BLOB)) > 0
-                              UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0)
+                              UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0
+                              UNION SELECT number FROM games
+                                    WHERE state = 0 AND instr(header, CAST($1 AS BLOB)) > 0)
              ORDER BY number",
         )
         .bind(name)
@@ -68,7 +71,7 @@ impl Rewritable for SqliteStore {
 
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let row = sqlx::query(
-            "SELECT game_id, state, filed, header, summary, record, last_row, signature
+            "SELECT game_id, state, filed, header, summary, record, last_row, signature, form
              FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
         )
         .bind(number)
@@ -83,6 +86,7 @@ impl Rewritable for SqliteStore {
         Ok(Some(GameRows {
             number,
             id,
+            form: row.get(8),
             is_running: row.get::<i64, _>(1) == 0,
             is_filed: row.get(2),
             header: row.get(3),
@@ -93,14 +97,12 @@ impl Rewritable for SqliteStore {
         }))
     }
 
-    async fn tournament_rows(&self, number: i64) -> Result<Vec<(i64, Vec<u8>)>, StoreError> {
-        sqlx::query_as(
-            "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-        )
-        .bind(number)
-        .fetch_all(&self.reader.pool)
-        .await
-        .map_err(failure)
+    async fn tournament_rows(&self, number: i64) -> Result<Vec<TournamentRow>, StoreError> {
+        sqlx::query_as(TOURNAMENT_ROWS)
+            .bind(number)
+            .fetch_all(&self.reader.pool)
+            .await
+            .map_err(failure)
     }
 
     async fn write(&self, rewrite: Rewrite) -> Result<(), StoreError> {

@@ -77,6 +77,20 @@ fn marked(label: &str) -> Entry {
     })))
 }
 
+/// Ana in a tournament.
+fn entrant() -> Entrant {
+    Entrant {
+        name: "Ana".into(),
+        name_fingerprint: fingerprint_of("Ana"),
+        kind: chefshat_tournament::ParticipantKind::Human,
+        built_in: None,
+        filler: false,
+        stateless: false,
+        max_games: 1,
+        at_table: false,
+    }
+}
+
 /// Ana sat down, left, and came back to another seat; Bo is there, too.
 fn game(number: u8) -> (Arc<GameHeader>, [Vec<Entry>; 2]) {
     let header = Arc::new(GameHeader {
@@ -272,6 +286,61 @@ async fn a_removal_that_fails_is_completed_when_it_is_repeated() {
     store.close().await;
 }
 
+/// Stores a game and a tournament of Ana's that are over.
+async fn game_and_tournament(store: &dyn Store) {
+    let (header, [begin, _]) = game(1);
+    let created = store.create(Arc::clone(&header), begin).await;
+    let mut journal = created.expect("a new game");
+    let ended = journal.finish(Some(summary_of(&header)), None);
+    ended.await.expect("committed");
+    let joined = TournamentEntry::Change(TournamentChange::Joined(entrant()));
+    let closed = TournamentEntry::Change(TournamentChange::Closed);
+    let created = store.create_tournament(Arc::new(cup(7)), vec![joined, closed]);
+    created.await.expect("committed");
+}
+
+/// Once a later version has stored this, removing Ana is refused until it is of this version again.
+async fn refused_of_later(store: &dyn Store, later: &str) {
+    let refused = store.forget(&ana()).await;
+    let is_unreadable = matches!(refused, Err(ForgetError::Unreadable { .. }));
+    assert!(is_unreadable, "{later}: {refused:?}");
+    assert_eq!(games_of(store, "Ana").await.len(), 1, "{later}");
+}
+
+/// What this version does not know of it would be lost.
+#[tokio::test]
+async fn what_a_later_version_has_stored_is_not_written_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE));
+    let store = SqliteStore::open(folder.path()).await.expect("a store");
+    game_and_tournament(&store).await;
+    let mut other = SqliteConnection::connect_with(&file).await.expect("open");
+    let database = chefshat_postgres::database();
+    let shared = postgres::tests::node(&database).await;
+    game_and_tournament(&shared).await;
+    for table in ["games", "tournaments"] {
+        let [later, present] = [99, form::FORM].map(|it| format!("UPDATE {table} SET form = {it}"));
+        other
+            .execute(AssertSqlSafe(later.clone()))
+            .await
+            .expect("done");
+        refused_of_later(&store, &later).await;
+        other
+            .execute(AssertSqlSafe(present.clone()))
+            .await
+            .expect("done");
+        database.run(&later);
+        refused_of_later(&shared, &later).await;
+        database.run(&present);
+    }
+    other.close().await.expect("closed");
+    for store in [&store as &dyn Store, &shared] {
+        let forgotten = store.forget(&ana()).await.expect("all are over");
+        assert_eq!((forgotten.games.len(), forgotten.tournaments), (1, 1));
+        store.close().await;
+    }
+}
+
 /// Every statement is a round trip to the database, and a transaction must end in time.
 #[tokio::test]
 async fn how_much_postgresql_is_asked_at_once_does_not_grow_with_the_games() {
@@ -375,6 +444,9 @@ async fn a_player_at_a_physical_table_is_removed() {
         });
         let created = store.create(Arc::clone(&at_table), Vec::new()).await;
         let mut journal = created.expect("a new game");
+        let refused = store.forget(&ana()).await;
+        let is_running = matches!(refused, Err(ForgetError::GameRunning(_)));
+        assert!(is_running, "its journal does not name her: {refused:?}");
         let mut summary = summary_of(&at_table);
         summary.seats.truncate(2);
         let ended = journal.finish(Some(summary), None);
@@ -448,18 +520,8 @@ async fn what_is_not_over_prevents_it() {
         let ended = journal.finish(Some(summary_of(&header)), None);
         ended.await.expect("committed");
 
-        let entrant = Entrant {
-            name: "Ana".into(),
-            name_fingerprint: fingerprint_of("Ana"),
-            kind: chefshat_tournament::ParticipantKind::Human,
-            built_in: None,
-            filler: false,
-            stateless: false,
-            max_games: 1,
-            at_table: false,
-        };
         let tournament = Arc::new(cup(7));
-        let joined = vec![TournamentEntry::Change(TournamentChange::Joined(entrant))];
+        let joined = vec![TournamentEntry::Change(TournamentChange::Joined(entrant()))];
         let made = store.create_tournament(Arc::clone(&tournament), joined);
         made.await.expect("committed");
         let refused = store.forget(&ana()).await;
