@@ -458,6 +458,14 @@ async fn tidy(
     expire_after: i64,
     retention: i64,
 ) -> sqlx::Result<()> {
+    // The clock was set back: as long as it has not come to the last beat of a node that has died
+    // since, its lease would not end. One that lives beats again anyway.
+    sqlx::query(
+        "UPDATE nodes SET beat_ms = clock_ms()
+         WHERE node IN (SELECT node FROM nodes WHERE beat_ms > clock_ms() FOR UPDATE SKIP LOCKED)",
+    )
+    .execute(&mut *connection)
+    .await?;
     sqlx::query(
         "DELETE FROM owned WHERE id IN (
              SELECT id FROM owned WHERE NOT durable AND NOT over AND unit = id AND node IS NULL

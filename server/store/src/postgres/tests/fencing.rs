@@ -442,6 +442,22 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
 }
 
 #[tokio::test]
+async fn a_node_that_died_before_the_clock_was_set_back_is_survived() {
+    let pair = Pair::new().await;
+    let created = pair.first.create(durable(1), vec![entry(1)]);
+    created.await.expect("created");
+    pair.database
+        .run("UPDATE test_clock SET now_ms = now_ms - 900000");
+    for orphans in [vec![], vec![(Id::from_bytes([1; 16]), FIRST)]] {
+        pair.second.beat(REACHED).await.expect("it answers");
+        assert_eq!(pair.second.orphans(9).await, Ok(orphans));
+        pair.second.tidy().await.expect("it answers");
+        advance(&pair.database, 8_000);
+    }
+    pair.close().await;
+}
+
+#[tokio::test]
 async fn nodes_that_live_are_listed_first() {
     let database = chefshat_postgres::database();
     let lost = node(&database).await;
