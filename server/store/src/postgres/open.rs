@@ -58,11 +58,11 @@ const SESSION: [(&str, &str); 6] = [
 /// Why a database cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    /// The address is not one.
+    /// The address, which may contain a password, is not one.
     #[error(
-        "{0:?} is not the address of a database: {1}; an example is postgres://user@host/chefshat"
+        "this is not the address of a database: {0}; an example is postgres://user@host/chefshat"
     )]
-    Address(String, String),
+    Address(String),
     /// The tables are not ours.
     #[error(
         "the database contains tables of another program; nothing was changed: create a database for chefshat alone, for example with createdb"
@@ -108,16 +108,8 @@ impl From<DatabaseError> for StoreError {
 /// Reads an address: a URL as PostgreSQL's own programs take it.
 pub(super) fn address(url: &str) -> Result<PgConnectOptions, DatabaseError> {
     let options = PgConnectOptions::from_str(url)
-        // It may contain a password.
-        .map_err(|error| DatabaseError::Address(without_password(url), error.to_string()))?;
+        .map_err(|error| DatabaseError::Address(error.to_string()))?;
     Ok(options.application_name("chefshat"))
-}
-
-fn without_password(url: &str) -> String {
-    match (url.split_once("://"), url.rsplit_once('@')) {
-        (Some((scheme, _)), Some((_, host))) => format!("{scheme}://…@{host}"),
-        _ => url.to_owned(),
-    }
 }
 
 /// An address as people may read it: without its user and password.

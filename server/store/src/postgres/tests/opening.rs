@@ -122,7 +122,9 @@ async fn a_later_schema_is_used_if_it_only_adds() {
 async fn addresses_are_refused_without_showing_a_password() {
     for (url, advice) in [
         ("not an address", "postgres://user@host"),
-        ("postgres://ada:secret@host:port/games", "ada"),
+        ("host=localhost password=secret", "postgres://user@host"),
+        ("postgres://ada:secret@host:port/games", "port"),
+        ("postgres://host:port/games?password=secret", "port"),
         (
             "postgres://ada:secret@127.0.0.1:1/games",
             "cannot be reached",
@@ -131,7 +133,7 @@ async fn addresses_are_refused_without_showing_a_password() {
         let opened = PostgresStore::open(url, PostgresOptions::default()).await;
         let error = opened.err().expect("it is refused").to_string();
         assert!(!error.contains("secret"), "{error}");
-        assert!(error.contains(advice) || advice == "ada", "{error}");
+        assert!(error.contains(advice), "{error}");
     }
 }
 
