@@ -15,7 +15,7 @@ use tokio::time::timeout;
 use tracing::error;
 
 use super::errors::failure;
-use super::retained::{divided, old};
+use super::retained::{Candidate, divided, old};
 use super::values::{indexed_name, text};
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
@@ -307,13 +307,14 @@ impl Reader {
         let (mut after, mut page) = (integer(after), count);
         let mut found = Vec::new();
         loop {
-            let games =
+            let rows =
                 self.read(|connection| old(connection, keep, (after, page), unwritten).boxed());
-            let games = games.await?;
-            let Some(last) = games.last() else {
+            let rows = rows.await?;
+            let Some(last) = rows.last() else {
                 return Ok(found);
             };
-            after = last.number;
+            after = last.get(0);
+            let games = rows.iter().filter_map(Candidate::of).collect();
             let divided = self.read(|connection| divided(connection, games).boxed());
             let (free, _) = divided.await?;
             let left = count - found.len();

@@ -24,7 +24,7 @@ pub(super) struct Candidate {
 
 impl Candidate {
     /// From a number, id, encoding and header.
-    fn of(row: &PgRow) -> Option<Self> {
+    pub(super) fn of(row: &PgRow) -> Option<Self> {
         Some(Self {
             number: row.get(0),
             game: Id::from_bytes(row.get::<&[u8], _>(1).try_into().ok()?),
@@ -33,22 +33,21 @@ impl Candidate {
     }
 }
 
-/// The next games, after a number, that are old enough to be deleted.
+/// The rows of the next games, after a number, that are old enough to be deleted.
 pub(super) async fn old(
     connection: &mut PgConnection,
     keep: Keep,
     (after, count): (i64, usize),
     unwritten: bool,
-) -> sqlx::Result<Vec<Candidate>> {
-    let rows = sqlx::query(OLD_GAMES)
+) -> sqlx::Result<Vec<PgRow>> {
+    sqlx::query(OLD_GAMES)
         .bind(after)
         .bind(integer(keep.newest.unwrap_or_default().max(1)))
         .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
         .bind(integer(count as u64))
         .bind(unwritten)
         .fetch_all(connection)
-        .await?;
-    Ok(rows.iter().filter_map(Candidate::of).collect())
+        .await
 }
 
 /// Those of these games that are over, locked.

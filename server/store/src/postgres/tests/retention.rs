@@ -52,6 +52,29 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
 }
 
 #[tokio::test]
+async fn a_game_with_a_damaged_id_does_not_hide_the_others() {
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    for room in [1, 2, 3] {
+        let created = store.create(durable(room), vec![entry(1)]).await;
+        let mut journal = created.expect("created");
+        let finished = journal.finish(Some(summary(room)), None).await;
+        finished.expect("committed");
+        let written = store.mark_record_written(Id::from_bytes([room; 16]));
+        written.await.expect("committed");
+    }
+    database
+        .run("UPDATE games SET game_id = 'damaged' WHERE number = (SELECT min(number) FROM games)");
+    let found = store.prunable(Keep::default(), 0, 1).await;
+    let found = found.expect("readable");
+    assert_eq!(
+        found.iter().map(|(_, game)| *game).collect::<Vec<_>>(),
+        [Id::from_bytes([2; 16])]
+    );
+    store.close().await;
+}
+
+#[tokio::test]
 async fn a_record_takes_no_id_of_a_game_that_another_node_plays() {
     let database = chefshat_postgres::database();
     let (first, second) = (node(&database).await, node(&database).await);
