@@ -93,13 +93,19 @@ impl Target {
         let uri: Uri = url.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|host| !host.is_empty());
         let host = host.ok_or_else(wrong)?;
-        // An address of IPv6 stands in brackets.
-        let host = host.trim_matches(['[', ']']).to_owned();
         let (encrypted, port) = match uri.scheme_str() {
             Some("http") => (false, 80),
             Some("https") => (true, 443),
             _ => return Err(wrong()),
         };
+        // Too large a number is no port for the parser, which must not mean the usual one.
+        let rest = host_and_port(&uri).strip_prefix(host);
+        let port = match rest.and_then(|rest| rest.strip_prefix(':')) {
+            None | Some("") => port,
+            Some(port) => port.parse().map_err(|_| wrong())?,
+        };
+        // An address of IPv6 stands in brackets.
+        let host = host.trim_matches(['[', ']']).to_owned();
         let tls = match encrypted {
             true => {
                 let name = ServerName::try_from(host.clone()).map_err(|_| wrong())?;
@@ -108,9 +114,9 @@ impl Target {
             false => None,
         };
         Ok(Self {
-            port: uri.port_u16().unwrap_or(port),
             uri,
             host,
+            port,
             tls,
         })
     }
@@ -132,11 +138,8 @@ impl Target {
         longest: usize,
     ) -> Result<Answer, PostError> {
         let path = self.uri.path_and_query().map_or("/", |path| path.as_str());
-        let authority = self.uri.authority().map_or("", |it| it.as_str());
-        // Without a user and password.
-        let host = authority.rsplit('@').next().unwrap_or_default();
         let mut request = Request::post(path)
-            .header(header::HOST, host)
+            .header(header::HOST, host_and_port(&self.uri))
             .header(header::CONTENT_TYPE, "application/json")
             .header(
                 header::USER_AGENT,
@@ -170,6 +173,12 @@ impl Target {
             }
         }
     }
+}
+
+/// The host of an address and the port as they are written there, without a user and password.
+fn host_and_port(uri: &Uri) -> &str {
+    let authority = uri.authority().map_or("", |it| it.as_str());
+    authority.rsplit('@').next().unwrap_or_default()
 }
 
 /// The answer to a request.
@@ -220,4 +229,30 @@ fn connector(ca: Option<&Path>) -> Result<TlsConnector, PostError> {
         .with_root_certificates(roots)
         .with_no_client_auth();
     Ok(TlsConnector::from(Arc::new(config)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_is_the_one_that_is_written_or_the_usual_one() {
+        for (url, authority) in [
+            ("http://example.org", Some("example.org:80")),
+            ("http://example.org:/x", Some("example.org:80")),
+            ("http://ada:1@example.org:8080/x", Some("example.org:8080")),
+            ("http://ada:1@example.org/x", Some("example.org:80")),
+            ("http://[::1]:8080", Some("[::1]:8080")),
+            ("http://[::1]", Some("[::1]:80")),
+            ("http://example.org:80800", None),
+            ("http://example.org:http", None),
+        ] {
+            let target = Target::new(url, None).ok();
+            assert_eq!(
+                target.map(|it| it.authority()).as_deref(),
+                authority,
+                "{url}"
+            );
+        }
+    }
 }
