@@ -103,7 +103,7 @@ pub async fn transfer(
         return Err(sqlite::moved(data_dir, other).into());
     }
     open::migrate(url).await?;
-    let mut connection = open::connect(&address).await?;
+    let mut connection = open::connect_writer(&address).await?;
     let mut transaction = connection.begin().await?;
     // Nobody creates anything meanwhile.
     sqlx::query("LOCK TABLE games, tournaments, studies, owned IN EXCLUSIVE MODE")

@@ -277,6 +277,31 @@ async fn commits_wait_for_the_standby_whatever_the_database_is_set_to() {
 }
 
 #[tokio::test]
+async fn a_move_waits_for_the_standby_whatever_the_database_is_set_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = crate::SqliteStore::open(folder.path()).await;
+    let source = source.expect("a store");
+    let created = source.create(durable(1), vec![entry(1)]).await;
+    drop(created.expect("created"));
+    source.close().await;
+    drop(source);
+    let mut primary = Primary::new().await;
+    migrate(primary.database.url()).await.expect("it is empty");
+    primary.lose_standby().await;
+    let off = "ALTER SYSTEM SET synchronous_commit = off";
+    primary.database.run(off);
+    primary.database.run("SELECT pg_reload_conf()");
+    let url = primary.database.url().to_owned();
+    let mut moving = pin!(transfer(folder.path(), &url, |_, _| {}));
+    tokio::select! {
+        moved = &mut moving => panic!("the standby does not have it: {moved:?}"),
+        _ = primary.wait() => {}
+    }
+    primary.regain_standby();
+    assert!(moving.await.is_ok_and(|moved| moved.unfinished == 1));
+}
+
+#[tokio::test]
 async fn what_stands_does_not_fail_with_what_is_refused_beside_it() {
     let mut primary = Primary::new().await;
     let store = node(&primary.database).await;
