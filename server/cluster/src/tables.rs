@@ -214,16 +214,26 @@ impl<K: Ord + Copy, E> Tables<K, E> {
             .map(|(id, item)| (*id, item))
     }
 
-    /// Writes a row at a position, from 0, if the writer has the present epoch and the position is the next one.
-    pub fn append(&mut self, id: K, epoch: Epoch, position: u64, entries: E) -> Written {
-        match self.items.get_mut(&id) {
-            Some(item)
-                if !item.over && item.epoch == epoch && item.journal.len() as u64 == position =>
-            {
-                item.journal.push(Row { epoch, entries });
-                Written::Committed
-            }
-            _ => Written::Refused,
+    /// Writes a row at a position, from 0, if the writer has the present epoch and the position is the next one. Doing so again
+    /// changes nothing, at any time: a writer that had no answer learns that its row stands.
+    pub fn append(&mut self, id: K, epoch: Epoch, position: u64, entries: E) -> Written
+    where
+        E: PartialEq,
+    {
+        let Some(item) = self.items.get_mut(&id) else {
+            return Written::Refused;
+        };
+        let row = Row { epoch, entries };
+        let rows = item.journal.len() as u64;
+        if !item.over && item.epoch == epoch && rows == position {
+            item.journal.push(row);
+            return Written::Committed;
+        }
+        let position = usize::try_from(position).ok();
+        let stands = position.and_then(|position| item.journal.get(position));
+        match stands == Some(&row) {
+            true => Written::Committed,
+            false => Written::Refused,
         }
     }
 
@@ -244,12 +254,6 @@ impl<K: Ord + Copy, E> Tables<K, E> {
     pub fn open_items(&self, unit: K) -> Vec<K> {
         let items = self.open().filter(|(_, item)| item.unit == unit);
         items.map(|(id, _)| id).collect()
-    }
-
-    /// Whether a writer of this epoch may still append to the journal of an item.
-    pub fn may_append(&self, id: K, epoch: Epoch) -> bool {
-        let item = self.items.get(&id);
-        item.is_some_and(|item| item.epoch == epoch && !item.over)
     }
 
     /// The rows of a journal, from position 0.

@@ -6,8 +6,8 @@ mod property;
 use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_cluster::{
-    BeatAnswer, ClaimAnswer, Created, Epoch, Input, LeaseTimes, Node, NodeId, Output, Phase, Step,
-    Tables, Writer, Written,
+    BeatAnswer, ClaimAnswer, Created, Epoch, Input, LeaseTimes, Node, NodeId, Output, Phase,
+    Tables, Written,
 };
 use stateright::{Model, Property};
 
@@ -99,7 +99,6 @@ pub(crate) enum Request {
     Release(Epoch),
     Create(Epoch),
     Append(u8, Epoch, u64, Entry),
-    Read(u8, Epoch, u64),
     Finish(u8, Epoch, u64),
     Leave,
 }
@@ -113,14 +112,14 @@ pub(crate) enum Answer {
     Done,
     Created(Created),
     Written(Written),
-    /// The row at a position, and whether the writer is fenced.
-    Read(Option<(Epoch, Entry)>, bool),
 }
 
 /// An item that runs on a server.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Running {
-    writer: Writer,
+    epoch: Epoch,
+    /// Where the next row belongs.
+    position: u64,
     /// The decision whose append is not answered.
     open: Option<Entry>,
     /// A committed decision that waits for a lease to be published.
@@ -223,10 +222,11 @@ impl Cluster {
                 let mut publish = Vec::new();
                 for (id, running) in &mut it.running {
                     let entry = running.unpublished.take();
-                    publish.extend(entry.map(|entry| (*id, running.writer.clone(), entry)));
+                    let (position, epoch) = (running.position, running.epoch);
+                    publish.extend(entry.map(|entry| (*id, position - 1, epoch, entry)));
                 }
-                for (id, writer, entry) in publish {
-                    world.publish(id, writer.position() - 1, writer.epoch(), entry);
+                for (id, position, epoch, entry) in publish {
+                    world.publish(id, position, epoch, entry);
                 }
             }
             Output::Release(_, epoch) => {
@@ -256,7 +256,7 @@ impl Cluster {
     /// is done with it is checked again.
     fn send(&self, world: &mut World, server: usize, request: Request) {
         let at_once = match request {
-            Request::FindOrphans | Request::Read(..) | Request::Leave => true,
+            Request::FindOrphans | Request::Leave => true,
             Request::Beat(_) => !self.bounds.slow_beats,
             _ => false,
         };
@@ -336,15 +336,6 @@ impl Cluster {
                 };
                 Answer::Written(tables.append(item, epoch, position, entry))
             }
-            Request::Read(item, epoch, position) => {
-                let row = tables.journal(item).get(position as usize);
-                let row = row.map(|row| (shown(row.epoch), row.entries));
-                let epoch = match any_epoch {
-                    true => present(tables, item, epoch),
-                    false => epoch,
-                };
-                Answer::Read(row, !tables.may_append(item, epoch))
-            }
             Request::Finish(item, epoch, rows) => {
                 let checked = match any_epoch || self.has(Fault::FinishWithoutEpoch) {
                     true => present(tables, item, epoch),
@@ -375,32 +366,25 @@ impl Cluster {
         };
         let input = match (to, answer) {
             (Request::Append(item, epoch, ..), answer) => {
-                let written = match answer {
-                    Some(Answer::Written(written)) => Some(written),
-                    _ => self
-                        .has(Fault::UnknownIsCommitted)
-                        .then_some(Written::Committed),
-                };
-                let running = it.running.get_mut(&item);
-                if let Some(running) = running.filter(|it| it.writer.epoch() == epoch) {
-                    let step = running.writer.appended(written);
-                    self.go_on(world, server, item, step);
+                let running = it.running.get(&item);
+                if running.is_none_or(|it| it.epoch != epoch) {
+                    return;
                 }
-                return;
-            }
-            (Request::Read(item, ..), Some(Answer::Read(row, fenced))) => {
-                if let Some(running) = it.running.get_mut(&item) {
-                    let epoch = running.writer.epoch();
-                    let ours =
-                        row.map(|(writer, entry)| writer == epoch && Some(entry) == running.open);
-                    let step = running.writer.read(ours, fenced);
-                    self.go_on(world, server, item, step);
+                match answer {
+                    Some(Answer::Written(Written::Committed)) => {
+                        return self.committed(world, server, item);
+                    }
+                    None if self.has(Fault::UnknownIsCommitted) => {
+                        return self.committed(world, server, item);
+                    }
+                    Some(_) => Input::Fenced(UNIT, epoch),
+                    // Doing so again changes nothing.
+                    None => return self.send(world, server, to),
                 }
-                return;
             }
             (Request::Finish(item, epoch, _), answer) => {
                 let running = it.running.get(&item);
-                if running.is_none_or(|it| !it.ends || it.writer.epoch() != epoch) {
+                if running.is_none_or(|it| !it.ends || it.epoch != epoch) {
                     return;
                 }
                 match answer {
@@ -465,38 +449,28 @@ impl Cluster {
         self.put_in(world, server, input);
     }
 
-    /// The writer of an item says what comes next.
-    fn go_on(&self, world: &mut World, server: usize, item: u8, step: Step) {
+    /// The open decision of an item is committed: it is published, or waits for a lease.
+    fn committed(&self, world: &mut World, server: usize, item: u8) {
         let it = world.servers[server].as_mut().expect("it lives");
         let may_publish = it.node.may_publish(world.now);
         let running = it.running.get_mut(&item).expect("it runs");
-        let epoch = running.writer.epoch();
-        let position = running.writer.position();
-        match step {
-            Step::Publish => {
-                let entry = running.open.take().expect("an append is open");
-                if may_publish || self.has(Fault::PublishedWhileSuspended) {
-                    world.publish(item, position - 1, epoch, entry);
-                } else {
-                    running.unpublished = Some(entry);
-                }
-                self.release_if_quiet(world, server);
-            }
-            Step::Read => self.send(world, server, Request::Read(item, epoch, position)),
-            Step::Append => {
-                let entry = running.open.expect("an append is open");
-                let append = Request::Append(item, epoch, position, entry);
-                self.send(world, server, append);
-            }
-            Step::Stop => self.put_in(world, server, Input::Fenced(UNIT, epoch)),
+        let entry = running.open.take().expect("an append is open");
+        let (epoch, position) = (running.epoch, running.position);
+        running.position += 1;
+        if may_publish || self.has(Fault::PublishedWhileSuspended) {
+            world.publish(item, position, epoch, entry);
+        } else {
+            running.unpublished = Some(entry);
         }
+        self.release_if_quiet(world, server);
     }
 }
 
 impl Running {
-    fn new(epoch: Epoch, rows: u64) -> Self {
+    fn new(epoch: Epoch, position: u64) -> Self {
         Self {
-            writer: Writer::new(epoch, rows),
+            epoch,
+            position,
             open: None,
             unpublished: None,
             ends: false,
@@ -688,7 +662,7 @@ impl Cluster {
                 };
                 let running = next.running(server, item);
                 running.open = Some(entry);
-                let (epoch, position) = (running.writer.epoch(), running.writer.position());
+                let (epoch, position) = (running.epoch, running.position);
                 if self.has(Fault::PublishedEarly) {
                     next.publish(item, position, epoch, entry);
                 }
@@ -699,12 +673,12 @@ impl Cluster {
                 next.ends += 1;
                 let running = next.running(server, item);
                 running.ends = true;
-                let (epoch, rows) = (running.writer.epoch(), running.writer.position());
+                let (epoch, rows) = (running.epoch, running.position);
                 self.send(next, server, Request::Finish(item, epoch, rows));
             }
             Transition::Create(server) => {
                 next.creations += 1;
-                let epoch = next.running(server, UNIT).writer.epoch();
+                let epoch = next.running(server, UNIT).epoch;
                 let it = next.servers[server].as_mut().expect("it lives");
                 it.creates = true;
                 self.send(next, server, Request::Create(epoch));

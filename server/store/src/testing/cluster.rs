@@ -19,14 +19,31 @@ use crate::cluster::{
     Beat, ClusterStore, Epoch, Heartbeat, LivingNode, LoadedUnit, Location, NodeId, NodeInfo,
     NodeStatus, Subject,
 };
+use crate::form;
 use crate::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use crate::{Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
 
-#[derive(Clone)]
+/// Encoded entries.
+#[derive(Clone, PartialEq)]
 enum Row {
-    Game(Vec<Entry>),
+    Game(Vec<u8>),
     /// Of a tournament.
     Unit(Vec<u8>),
+}
+
+impl Row {
+    fn of_game(entries: &[Entry]) -> Self {
+        Self::Game(form::entries_to_bytes(&mut entries.to_vec()))
+    }
+
+    /// The entries of a game.
+    fn entries(&self) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        if let Self::Game(bytes) = self {
+            form::read_entries(bytes, &mut entries).expect("it was encoded here");
+        }
+        entries
+    }
 }
 
 /// A unit that a node has released.
@@ -133,12 +150,9 @@ impl Database {
     pub fn seated(&self, room: RoomId) -> Vec<String> {
         let tables = self.tables();
         let rows = tables.journal(room.unit()).iter();
-        let entries = rows.flat_map(|row| match &row.entries {
-            Row::Game(entries) => entries.as_slice(),
-            Row::Unit(_) => &[],
-        });
-        let names = entries.filter_map(|entry| match &entry.change {
-            Change::Seated { participant, .. } => Some(participant.name.clone()),
+        let entries = rows.flat_map(|row| row.entries.entries());
+        let names = entries.filter_map(|entry| match entry.change {
+            Change::Seated { participant, .. } => Some(participant.name),
             _ => None,
         });
         names.collect()
@@ -263,7 +277,7 @@ impl FakeJournal {
 impl Journal for FakeJournal {
     async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         self.reached().await;
-        let row = Row::Game(entries.clone());
+        let row = Row::of_game(entries);
         let room = self.header.room_id.unit();
         let written = (self.database.tables()).append(room, self.epoch, self.rows, row);
         self.written(written)?;
@@ -323,7 +337,7 @@ impl Store for FakeStore {
                 return Err(StoreError::Taken(header.game_id.to_string()));
             }
         }
-        let row = Row::Game(entries.clone());
+        let row = Row::of_game(&entries);
         let epoch = match header.tournament {
             None => {
                 let made = (self.database.tables()).create(room, self.node(), row);
@@ -535,7 +549,7 @@ impl ClusterStore for FakeStore {
             let change = Change::ServerRestarted;
             games
                 .get(&id)
-                .map(|_| Row::Game(vec![Entry { at, change }]))
+                .map(|_| Row::of_game(&[Entry { at, change }]))
         };
         let now_ms = self.database.now_ms();
         let mut tables = self.database.tables();
@@ -559,10 +573,7 @@ impl ClusterStore for FakeStore {
             let journal = tables.journal(id);
             let rows = journal.len() as u64;
             if let Some(header) = headers.get(&id) {
-                let entries = journal.iter().flat_map(|row| match &row.entries {
-                    Row::Game(entries) => entries.clone(),
-                    Row::Unit(_) => Vec::new(),
-                });
+                let entries = journal.iter().flat_map(|row| row.entries.entries());
                 let entries: Vec<_> = entries.collect();
                 games.push(ResumableGame {
                     header: GameHeader::clone(header),
@@ -652,10 +663,7 @@ impl ClusterStore for FakeStore {
             return Ok(None);
         };
         let rows = tables.journal(room.unit());
-        let entries = rows.iter().flat_map(|row| match &row.entries {
-            Row::Game(entries) => entries.clone(),
-            Row::Unit(_) => Vec::new(),
-        });
+        let entries = rows.iter().flat_map(|row| row.entries.entries());
         let entries: Vec<_> = entries.collect();
         let count = rows.len() as u64;
         Ok(Some(ResumableGame {
