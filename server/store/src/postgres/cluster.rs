@@ -14,7 +14,6 @@ use sqlx::{Connection as _, Row as _};
 
 use super::claims::{Claims, claim};
 use super::handover::{Handed, release};
-use super::owned::rooms;
 use super::partitions;
 use super::values::{ROOM, kind_of, millis, text};
 use super::{PostgresStore, lock};
@@ -366,12 +365,20 @@ impl ClusterStore for PostgresStore {
 
     async fn ended_room(&self, room: RoomId) -> Result<Option<ResumableGame>, StoreError> {
         let rows = self.reader.read(move |connection| {
-            sqlx::query(rooms!("id = $1 AND over"))
-                .bind(room.bytes().to_vec())
-                .fetch_all(connection)
-                .boxed()
+            sqlx::query(
+                "SELECT number, games.form, header, over, epoch
+                 FROM owned JOIN games USING (game_id) WHERE durable AND kind = 0 AND id = $1 AND over",
+            )
+            .bind(room.bytes().to_vec())
+            .fetch_all(connection)
+            .boxed()
         });
-        Ok(self.resumables(rows.await?).await?.pop())
+        let rows = rows.await?;
+        let Some(epoch) = rows.first().map(|row| row.get(4)) else {
+            return Ok(None);
+        };
+        let room = self.reader.rooms(rows).await?.pop();
+        Ok(room.map(|room| self.resumable(room, epoch)))
     }
 
     async fn alive(&self) -> Result<Vec<LivingNode>, StoreError> {

@@ -1,6 +1,6 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
 //! reads, `journals`, `appends`, `commands`, `ends`, `forget` and `units` write through `writer`, `cluster`,
-//! `claims`, `handover` and `owned` are about nodes and what they own, `partitions` divides the table
+//! `claims` and `handover` are about nodes and what they own, `partitions` divides the table
 //! of journals, `transfer` moves an SQLite database here, `form` (beside this folder) encodes; this
 //! file joins them into a store.
 
@@ -15,7 +15,6 @@ mod forgetting;
 mod handover;
 mod journals;
 mod open;
-mod owned;
 mod partitions;
 mod reader;
 mod retained;
@@ -342,9 +341,9 @@ impl Store for PostgresStore {
         })
     }
 
-    /// Those of this node.
-    async fn resumable_games(&self, ended_since_ms: u64) -> Result<Vec<ResumableGame>, StoreError> {
-        self.own_games(ended_since_ms).await
+    /// None: a node resumes units ([`ClusterStore::load`](super::cluster::ClusterStore::load)).
+    async fn resumable_games(&self, _: u64) -> Result<Vec<ResumableGame>, StoreError> {
+        Ok(Vec::new())
     }
 
     async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
