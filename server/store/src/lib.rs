@@ -118,19 +118,27 @@ pub struct UnreadableGame {
     pub problem: String,
 }
 
+/// The summary of a finished game as it is stored.
+fn stored_summary(game: GameId, bytes: &[u8]) -> Result<v1::RecordSummary, UnreadableGame> {
+    v1::RecordSummary::decode(bytes).map_err(|error| UnreadableGame {
+        game,
+        problem: error.to_string(),
+    })
+}
+
+impl From<UnreadableGame> for StoreError {
+    fn from(error: UnreadableGame) -> Self {
+        Self::Unreadable(error.to_string())
+    }
+}
+
 /// A row of the list of finished games, of its number, its id, its summary and the beginning of its
 /// header.
 fn listed(number: i64, game: &[u8], summary: &[u8], header: Option<&[u8]>) -> Listed {
     let number = u64::try_from(number).unwrap_or_default();
-    let summary = v1::RecordSummary::decode(summary).map_err(|error| {
-        let unreadable = UnreadableGame {
-            game: game
-                .try_into()
-                .map_or(Id::from_bytes([0; 16]), Id::from_bytes),
-            problem: error.to_string(),
-        };
-        tracing::error!(number, problem = %unreadable, "a game is not listed");
-        unreadable
+    let game = Id::from_bytes(game.try_into().unwrap_or_default());
+    let summary = stored_summary(game, summary).inspect_err(|problem| {
+        tracing::error!(number, %problem, "a game is not listed");
     });
     Listed {
         number,

@@ -7,7 +7,6 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryStreamExt as _};
-use prost::Message as _;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnection, PgPool, PgRow};
 use sqlx::{Postgres, Row as _};
@@ -20,7 +19,7 @@ use super::values::{indexed_name, text};
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::sql::{MAX_PRUNABLE_READ, integer, list_query};
-use crate::{Keep, Listed, Part, StoreError, StoredGame, listed};
+use crate::{Keep, Listed, Part, StoreError, StoredGame, listed, stored_summary};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -204,19 +203,17 @@ impl Reader {
         &self,
         game: GameId,
     ) -> Result<Option<v1::RecordSummary>, StoreError> {
-        let row: Option<PgRow> = (self.read(|connection| {
-            sqlx::query("SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL")
-                .bind(game.bytes().to_vec())
-                .fetch_optional(connection)
-                .boxed()
+        let summary: Option<Vec<u8>> = (self.read(|connection| {
+            sqlx::query_scalar(
+                "SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL",
+            )
+            .bind(game.bytes().to_vec())
+            .fetch_optional(connection)
+            .boxed()
         }))
         .await?;
-        let decoded = row.map(|row| v1::RecordSummary::decode(row.get::<&[u8], _>(0)));
-        decoded.transpose().map_err(|error| {
-            StoreError::Unreadable(format!(
-                "the summary of game {game} cannot be read: {error}"
-            ))
-        })
+        let decoded = summary.map(|bytes| stored_summary(game, &bytes));
+        Ok(decoded.transpose()?)
     }
 
     /// See `Store::finished`.

@@ -6,7 +6,7 @@ use std::path::Path;
 use sqlx::Connection as _;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
-use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
+use super::errors::{BUSY_LIMIT, FILE};
 use super::open::{APPLICATION_ID, OpenError, SHRINKABLE, make_private};
 use chefshat_room::ids::{GameId, Id};
 
@@ -29,7 +29,7 @@ pub struct DatabaseCopy {
 /// There is no database of ours, or it cannot be read, or the copy cannot be written.
 pub async fn copy_database(data_dir: &Path, folder: &Path) -> Result<DatabaseCopy, OpenError> {
     let (source, copy) = (data_dir.join(FILE), folder.join(FILE));
-    let failed = |error| OpenError::Other(source.clone(), explain(&error));
+    let failed = |error| OpenError::of(&source, &error);
     let mut database = open(&source).await?;
     // SQLite writes to an empty file, which keeps its permissions.
     make_private(&copy)?;
@@ -82,13 +82,7 @@ async fn open(path: &Path) -> Result<SqliteConnection, OpenError> {
         path: path.to_path_buf(),
         source,
     })?;
-    let failed = |error: sqlx::Error| match () {
-        () if has_code(&error, NOT_A_DATABASE) => OpenError::NotOurs(path.to_path_buf()),
-        () if has_code(&error, CORRUPT) => {
-            OpenError::Damaged(path.to_path_buf(), error.to_string())
-        }
-        () => OpenError::Other(path.to_path_buf(), explain(&error)),
-    };
+    let failed = |error| OpenError::of(path, &error);
     let options = SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
@@ -107,7 +101,7 @@ async fn open(path: &Path) -> Result<SqliteConnection, OpenError> {
 }
 
 async fn contents(path: &Path) -> Result<DatabaseCopy, OpenError> {
-    let failed = |error| OpenError::Other(path.to_path_buf(), explain(&error));
+    let failed = |error| OpenError::of(path, &error);
     let mut database = open(path).await?;
     let (finished, unfinished): (i64, i64) = sqlx::query_as(
         "SELECT count(*) FILTER (WHERE summary IS NOT NULL), count(*) FILTER (WHERE state = 0) FROM games",

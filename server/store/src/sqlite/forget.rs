@@ -8,7 +8,7 @@ use sqlx::sqlite::{SqlitePool, SqliteRow};
 use sqlx::{Connection as _, Row as _};
 
 use super::SqliteStore;
-use super::errors::{explain, failure};
+use super::errors::{FILE, failure};
 use super::open::{self, IfGone, OpenError};
 use super::rows::with_own_rows;
 use super::writer::WriteCommand;
@@ -27,7 +27,7 @@ impl SqliteStore {
     pub async fn purge(data_dir: &Path) -> Result<(), OpenError> {
         let mut opened = open::open(data_dir, IfGone::CreateFirst).await?;
         opened.readers.close().await;
-        let failed = |error| OpenError::Other(data_dir.to_path_buf(), explain(&error));
+        let failed = |error| OpenError::of(&data_dir.join(FILE), &error);
         for tidying in [
             open::SHRINKABLE,
             "VACUUM",

@@ -56,7 +56,6 @@ use chefshat_base::tasks::{LongTask, named};
 use chefshat_room::ids::{GameId, StudyId};
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
-use errors::explain;
 use journals::{DurableJournal, Whole, WriteQueue};
 use reader::Reader;
 use space::{Disk, Space};
@@ -129,7 +128,7 @@ impl SqliteStore {
         )
         .fetch_one(&opened.readers)
         .await
-        .map_err(|error| OpenError::Other(data_dir.join(DATABASE_FILE), explain(&error)))?;
+        .map_err(|error| OpenError::of(&data_dir.join(DATABASE_FILE), &error))?;
         let (commands, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let decoding = DecodePool::new();

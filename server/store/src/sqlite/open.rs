@@ -90,6 +90,20 @@ pub enum OpenError {
     Other(PathBuf, String),
 }
 
+impl OpenError {
+    /// That of a database at this path.
+    pub(super) fn of(path: &Path, error: &sqlx::Error) -> Self {
+        let path = path.to_path_buf();
+        if has_code(error, NOT_A_DATABASE) {
+            Self::NotOurs(path)
+        } else if has_code(error, CORRUPT) {
+            Self::Damaged(path, error.to_string())
+        } else {
+            Self::Other(path, explain(error))
+        }
+    }
+}
+
 /// An opened database.
 pub(super) struct Opened {
     pub(super) writer: SqliteConnection,
@@ -188,15 +202,7 @@ async fn open_database(
         .filename(&path)
         .busy_timeout(BUSY_LIMIT)
         .statement_cache_capacity(STATEMENTS);
-    let failed = |error: sqlx::Error| {
-        if has_code(&error, NOT_A_DATABASE) {
-            OpenError::NotOurs(path.clone())
-        } else if has_code(&error, CORRUPT) {
-            OpenError::Damaged(path.clone(), error.to_string())
-        } else {
-            OpenError::Other(path.clone(), explain(&error))
-        }
-    };
+    let failed = |error| OpenError::of(&path, &error);
     if path.metadata().is_ok_and(|metadata| metadata.len() > 0) {
         // Checked before any setting: setting the journal mode writes.
         let mut looking = SqliteConnection::connect_with(&options.clone().read_only(true))

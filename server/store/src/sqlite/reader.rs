@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use futures::TryStreamExt as _;
-use prost::Message as _;
 use sqlx::Row as _;
 use sqlx::sqlite::SqlitePool;
 use tracing::error;
@@ -19,7 +18,7 @@ use crate::decode_pool::DecodePool;
 use crate::form::{self, FORM, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::sql::{MAX_PRUNABLE_READ, OLD_GAMES, integer, list_query};
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind};
-use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
+use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed, stored_summary};
 use chefshat_room::ids::{GameId, Id, StudyId};
 
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
@@ -101,12 +100,8 @@ impl Reader {
         .fetch_optional(&self.pool)
         .await
         .map_err(failure)?;
-        let decoded = summary.map(|bytes| v1::RecordSummary::decode(bytes.as_slice()));
-        decoded.transpose().map_err(|error| {
-            StoreError::Unreadable(format!(
-                "the summary of game {game} cannot be read: {error}"
-            ))
-        })
+        let decoded = summary.map(|bytes| stored_summary(game, &bytes));
+        Ok(decoded.transpose()?)
     }
 
     /// See `Store::finished`.
