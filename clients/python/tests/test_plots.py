@@ -7,7 +7,7 @@ from drawing import a_figure, png_size
 from matplotlib.legend import Legend
 
 from chefshat.learn import plots
-from chefshat.learn.figures import Figure
+from chefshat.learn.figures import Figure, Line, Panel
 
 
 def test_a_plot_is_deterministic() -> None:

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use chefshat_engine::MAX_SEATS;
 use chefshat_engine::limits::MAX_ANNOTATION_BYTES_PER_GAME;
-use chefshat_proto::v1::{RecordLine, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{GameEvent, RecordLine, game_event::Kind, record_line::Line};
 use prost::Message;
 
 use crate::atomic_file::{AtomicFile, WriteError};
@@ -374,13 +374,13 @@ struct Bounds {
 impl Bounds {
     fn check(&mut self, line: &RecordLine, is_first: bool) -> Result<(), LineProblem> {
         let line = line.line.as_ref().ok_or(LineProblem::Nothing)?;
+        let starts = |event: &GameEvent| matches!(event.kind, Some(Kind::GameStarted(_)));
         match line {
             Line::Header(_) if !is_first => return Err(LineProblem::SecondHeader),
-            Line::Event(event) if matches!(event.kind, Some(Kind::GameStarted(_))) => {
-                if std::mem::replace(&mut self.has_started, true) {
-                    return Err(LineProblem::SecondStart);
-                }
+            Line::Event(event) if starts(event) && self.has_started => {
+                return Err(LineProblem::SecondStart);
             }
+            Line::Event(event) => self.has_started |= starts(event),
             Line::Decision(decision) => {
                 let annotations = decision.annotations.as_ref();
                 self.annotation_bytes += annotations.map_or(0, Message::encoded_len);
