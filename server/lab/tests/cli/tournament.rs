@@ -182,7 +182,13 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     before.assert_says(&["nothing has been played yet", "Participants"]);
 
     let start = format!("tournament start {id} --json");
-    run(&url, &format!("{start} --owner-token nonsense")).assert_failed("OWNER_TOKEN_WRONG");
+    let wrong = format!("{id}{}", "0".repeat(64));
+    for (token, reason) in [
+        ("nonsense", "SECRETS_REFUSED"),
+        (&*wrong, "OWNER_TOKEN_WRONG"),
+    ] {
+        run(&url, &format!("{start} --owner-token {token}")).assert_failed(reason);
+    }
     let begun = run(&url, &format!("{start} --owner-file {owner}")).json();
     assert_eq!(begun["tournament"]["state"], "TOURNAMENT_STATE_PLAYING");
     let table = format!("tournament table {id} 0 --owner-file {owner}");
