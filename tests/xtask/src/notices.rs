@@ -83,6 +83,8 @@ pub(crate) fn notices(places: &Places, target: &str) -> Result<String, Failure> 
 
 /// The crates in the Python module, and in the program that contains what the other one contains.
 fn crates(places: &Places, target: &str) -> Result<Vec<Part>, Failure> {
+    // For both: without it, what only a release contains is not among the packages.
+    let features = ["--features", &format!("chefshat-lab/{FEATURE}")];
     let mut tree = cargo();
     tree.current_dir(&places.root);
     tree.args([
@@ -92,10 +94,8 @@ fn crates(places: &Places, target: &str) -> Result<Vec<Part>, Failure> {
         "chefshat-native",
         "--package",
         "chefshat-lab",
-        "--features",
-        &format!("chefshat-lab/{FEATURE}"),
     ]);
-    tree.args([
+    tree.args(features).args([
         "--edges", "normal", "--prefix", "none", "--format", "{p}", "--target", target,
     ]);
     let listed = read(&mut tree)?;
@@ -115,6 +115,7 @@ fn crates(places: &Places, target: &str) -> Result<Vec<Part>, Failure> {
         "--filter-platform",
         target,
     ]);
+    metadata.args(features);
     let metadata: Value = serde_json::from_str(&read(&mut metadata)?)
         .map_err(|error| Failure::new(format!("cargo metadata: {error}")))?;
     let packages = metadata["packages"].as_array().into_iter().flatten();
@@ -172,6 +173,17 @@ fn licences(folder: &Path) -> Result<Vec<String>, Failure> {
         .filter(|file| file.is_file())
         .map(|file| fs::read_to_string(&file).map_err(|error| at(&file, &error)))
         .collect()
+}
+
+#[test]
+fn what_only_a_release_contains_is_listed() {
+    let places = Places::find().unwrap();
+    let target = crate::wheels::static_target(std::env::consts::ARCH);
+    let parts = crates(&places, &target).unwrap();
+    for name in ["tokio 1", "tikv-jemalloc-sys 0", "rust-embed 8"] {
+        let found = parts.iter().find(|part| part.name.starts_with(name));
+        assert!(!licences(&found.unwrap().folder).unwrap().is_empty());
+    }
 }
 
 #[test]
