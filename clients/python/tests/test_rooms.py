@@ -282,6 +282,38 @@ class Illegal(Agent):
         return Greedy().decide(request)
 
 
+def test_a_room_is_closed_although_another_game_fails_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario() -> list[str]:
+        closing, may_close = asyncio.Event(), asyncio.Event()
+        closed: list[str] = []
+
+        async def create(*_: object, **__: object) -> pb.CreateRoomResponse:
+            return pb.CreateRoomResponse(room=pb.Room(room_id="room"), join_code="code")
+
+        async def join(*_: object, **__: object) -> pb.JoinRoomResponse:
+            raise ChefsHatError("ROOM_FULL", "no seat is free")
+
+        async def close(_: object, room_id: str, owner_token: str) -> None:
+            closing.set()
+            await may_close.wait()
+            closed.append(room_id)
+
+        for name, call in [("create", create), ("join", join), ("close", close)]:
+            monkeypatch.setattr(AsyncRooms, name, call)
+        games = rooms._Games([rooms.Seat("Ada", Agent)], pb.RuleSet(), ServerAddress("127.0.0.1:1"))
+        async with rooms.Client(games.server) as client:
+            game = asyncio.ensure_future(rooms._Game(games, client, 0, bytes(32)).play())
+            await closing.wait()
+            game.cancel()
+            await asyncio.sleep(0)
+            may_close.set()
+            with pytest.raises(asyncio.CancelledError):
+                await game
+        return closed
+
+    assert asyncio.run(scenario()) == ["room"]
+
+
 def open_rooms(address: str) -> set[str]:
     """The ids of the rooms whose games are not over. Other tests use the same server."""
     with chefshat.Client(address) as client:

@@ -240,12 +240,21 @@ class _Game:
             await _together([self._follow(created.room.room_id), self._fill(created.join_code)])
             return await self._shifts(created.room.game_id)
         except BaseException:
-            # It would take a room of the server's for as long as it waits for its players.
-            with contextlib.suppress(ChefsHatError, TimeoutError):
-                async with asyncio.timeout(CLOSE_S):
-                    created = await creating
-                    await self._client.rooms.close(created.room.room_id, created.owner_token)
+            closing = asyncio.ensure_future(self._close(creating))
+            try:
+                await asyncio.shield(closing)
+            except asyncio.CancelledError:
+                # Another game has failed, too.
+                await closing
+                raise
             raise
+
+    async def _close(self, creating: asyncio.Future[pb.CreateRoomResponse]) -> None:
+        """Closes the room, which would be one of the server's for as long as it waits for its players."""
+        with contextlib.suppress(ChefsHatError, TimeoutError):
+            async with asyncio.timeout(CLOSE_S):
+                created = await creating
+                await self._client.rooms.close(created.room.room_id, created.owner_token)
 
     async def _follow(self, room_id: str) -> None:
         """Follows the game to its end, if there are programs, which do not say whether they have their seats and have played."""
