@@ -23,6 +23,7 @@ import chefshat
 from chefshat import Agent, Batch, ChefsHatError, Decision, SeatInfo, SeatResult, VectorEnv, pb
 from chefshat._async.rooms import AsyncRooms
 from chefshat.address import ServerAddress
+from chefshat.aio import Client as AsyncClient
 from chefshat.learn import network, rooms
 from chefshat.learn.evaluation import Evaluation, OneOpponent, Player, PolicyAgent, compare, evaluate, game_seeds
 from chefshat.learn.rooms import Command
@@ -301,7 +302,7 @@ def test_a_room_is_closed_although_another_game_fails_meanwhile(monkeypatch: pyt
         for name, call in [("create", create), ("join", join), ("close", close)]:
             monkeypatch.setattr(AsyncRooms, name, call)
         games = rooms._Games([rooms.Seat("Ada", Agent)], pb.RuleSet(), ServerAddress("127.0.0.1:1"))
-        async with rooms.Client(games.server) as client:
+        async with AsyncClient(games.server) as client:
             game = asyncio.ensure_future(rooms._Game(games, client, 0, bytes(32)).play())
             await closing.wait()
             game.cancel()
