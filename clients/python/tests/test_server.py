@@ -87,7 +87,9 @@ def test_a_game_over_one_blocking_stream(real_address: str) -> None:
         assert lines[0].header.game_id == room.room.game_id
         assert lines[-1].footer.decisions == sum(result.decisions for result in results.values())
         watched = [event.sequence for event in client.rooms.watch(room.room.room_id)]
-        assert watched == next(iter(agents.values())).sequences
+        # Of a long game, the room has the latest events.
+        assert watched
+        assert watched == next(iter(agents.values())).sequences[-len(watched) :]
 
 
 def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
