@@ -20,6 +20,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "samples" / "cluster"))
 
 import rllib_ppo
+from measure import cpu_of
 from ray import cloudpickle
 
 from chefshat.learn.ppo_checkpoint import Plan
@@ -27,8 +28,6 @@ from chefshat.local_server import LocalServer
 
 # The runners' processes do not find this module.
 cloudpickle.register_pickle_by_value(rllib_ppo)
-
-TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
@@ -55,13 +54,7 @@ class Round:
 def busy() -> float:
     """Returns the seconds that the machine's cores have worked since it was started."""
     user, nice, system, _, _, irq, softirq, *_ = map(int, Path("/proc/stat").read_text().split()[1:11])
-    return (user + nice + system + irq + softirq) / TICKS
-
-
-def cpu_of(process: int) -> float:
-    """Returns the processor time of a process, in seconds."""
-    after_name = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(after_name[11]) + int(after_name[12])) / TICKS
+    return (user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")
 
 
 def one_round(algorithm: rllib_ppo.JaxPPO, runners: int, servers: Sequence[int]) -> Round:

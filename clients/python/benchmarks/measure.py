@@ -98,10 +98,11 @@ def _round(play: Callable[[], int], seconds: float) -> tuple[int, float, float]:
 
 def _processor_seconds() -> float:
     """The processor time of this process and, on Linux, of those that it has started, such as a server."""
-    children = [child for of_thread in Path("/proc/self/task").glob("*/children") for child in of_thread.read_text().split()]
-    ticks = 0
-    for child in children:
-        # Of the fields after the name, which may have spaces.
-        user, system = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[11:13]
-        ticks += int(user) + int(system)
-    return time.process_time() + ticks / os.sysconf("SC_CLK_TCK")
+    children = (child for of_thread in Path("/proc/self/task").glob("*/children") for child in of_thread.read_text().split())
+    return time.process_time() + sum(cpu_of(int(child)) for child in children)
+
+
+def cpu_of(process: int) -> float:
+    """Returns the processor time of a process on Linux, in seconds."""
+    after_name = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")
