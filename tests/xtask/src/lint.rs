@@ -185,18 +185,12 @@ pub(crate) fn licences(places: &Places, steps: &mut Steps) -> Result<(), Failure
     let deny = |arguments: &[&str]| {
         command::run(in_root(places, setup::cargo_deny(places)?).args(arguments))
     };
-    steps.run("cargo deny", || {
-        deny(&["--workspace", "check", "licenses", "bans", "sources"])
-    })?;
+    let mut check = vec!["--workspace", "check", "licenses", "bans", "sources"];
     match deny(&["fetch", "db"]) {
-        Ok(()) => steps.run("advisories", || {
-            deny(&["--workspace", "check", "advisories"])
-        }),
-        Err(failure) => {
-            steps.skip("advisories", &failure.to_string());
-            Ok(())
-        }
+        Ok(()) => check.push("advisories"),
+        Err(failure) => steps.skip("advisories", &failure.to_string()),
     }
+    steps.run("cargo deny", || deny(&check))
 }
 
 /// The linter, formatter and type checker of the Python packages, which must be set up.
