@@ -184,6 +184,7 @@ class _Running:
             threading.Thread(target=self._read_answers, args=(self._process.stdout,), daemon=True),
             threading.Thread(target=self._read_output, args=(self._process.stderr, log), daemon=True),
         ]
+        self._is_killed = False
         for reader in self._readers:
             reader.start()
 
@@ -236,7 +237,10 @@ class _Running:
                 self._process.stdin.close()
 
     def _kill(self) -> None:
-        """Kills what is left of the process and its children. Its group has its id for as long as one of them runs."""
+        """Kills what is left of the process and its children, once: the id of their group may be another's later."""
+        if self._is_killed:
+            return
+        self._is_killed = True
         with contextlib.suppress(OSError):
             if hasattr(os, "killpg"):
                 os.killpg(self._process.pid, signal.SIGKILL)
