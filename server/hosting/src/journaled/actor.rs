@@ -76,9 +76,7 @@ async fn run_on<U: Journaled>(
         let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
         tokio::select! {
             () = stop.end.cancelled() => {
-                if unit.unit().rooms.lease().is_some() {
-                    unit.end_streams();
-                }
+                leave_streams(unit);
                 return Ok(());
             }
             received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
@@ -145,8 +143,12 @@ fn fail<U: Journaled>(unit: &mut U, error: &StoreError) {
         (_, None) => error!(%id, %error, "the store failed; the {name} stops"),
     }
     report_stop(unit);
-    // Without a lease the whole server ends.
-    if core.rooms.lease().is_some() {
+    leave_streams(unit);
+}
+
+/// Ends the streams of a unit that stops here. Without a lease the whole server ends.
+fn leave_streams<U: Journaled>(unit: &mut U) {
+    if unit.unit().rooms.lease().is_some() {
         unit.end_streams();
     }
 }
