@@ -4,8 +4,8 @@
 import { type Fault, faultOf, isPassing } from "./faults";
 
 /** Pause before a failed request is repeated: the first, and the longest, doubled each time. */
-const SHORTEST_WAIT_MS = 250;
-const LONGEST_WAIT_MS = 8_000;
+export const SHORTEST_WAIT_MS = 250;
+export const LONGEST_WAIT_MS = 8_000;
 
 /**
  * The answer; undefined if nobody waits for it any more, or the server refuses. `onFault` is told why

@@ -5,6 +5,7 @@
 
 import { Code, type Interceptor } from "@connectrpc/connect";
 import { type Signal, signal } from "@preact/signals";
+import { LONGEST_WAIT_MS, SHORTEST_WAIT_MS } from "./asking";
 import { type Fault, faultOf, isPassing, PAGE_BROKEN } from "./faults";
 import { lookForUpdate } from "./update";
 
@@ -28,8 +29,6 @@ const HEARTBEAT_S = 3;
 /** After two missing heartbeats the connection counts as dead. */
 const SILENCE_MS = 9_000;
 const WATCH_EVERY_MS = 1_000;
-const SHORTEST_WAIT_MS = 250;
-const LONGEST_WAIT_MS = 8_000;
 
 /** The time by two clocks: that of the day may be set back, and the other may stand still while a device sleeps. */
 const clocks = () => ({ dayMs: Date.now(), runMs: performance.now() });
