@@ -98,7 +98,7 @@ impl Target {
             Some("https") => (true, 443),
             _ => return Err(wrong()),
         };
-        // Too large a number is no port for the parser, which must not mean the usual one.
+        // `Uri` says of a port above 65535 that there is none: it would be the usual one.
         let rest = host_and_port(&uri).strip_prefix(host);
         let port = match rest.and_then(|rest| rest.strip_prefix(':')) {
             None | Some("") => port,

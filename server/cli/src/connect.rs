@@ -350,7 +350,7 @@ async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError
         Some(_) => ("another", " other"),
         None => ("a", ""),
     };
-    // Without a code there is no failure, but something to wait for.
+    // A file without a code is waited for; one that cannot be read is an error.
     let read = async || match std::fs::read_to_string(file) {
         Ok(text) if !text.trim().is_empty() && last != Some(text.trim()) => {
             Ok(text.trim().to_owned())

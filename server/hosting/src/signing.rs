@@ -93,7 +93,7 @@ pub fn key_or_new(data_dir: &Path) -> Result<SigningKey, KeyError> {
     let seed: [u8; 32] = rand::random();
     match create(&data_dir.join(FILE), &seed) {
         Ok(()) => Ok(SigningKey::from_seed(&seed)),
-        // Another process was first, unless there is no key.
+        // If there is a key now, another process was first.
         Err(error) => key_of(data_dir)?.ok_or(KeyError::Io(error.path, error.source)),
     }
 }

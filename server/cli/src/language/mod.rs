@@ -23,8 +23,8 @@ The rules in short: get rid of your cards first. A lower number is rarer and bea
 more of them, and a joker alone is the weakest play. You must play a lower number than the board shows, and at least as many cards, or pass; a pass \
 counts until the pizza is done. When everybody else has passed, the board is cleared and whoever played last leads with anything. 11* is the Golden \
 card, which opens the Shift. Places give points, with which the game ends. Between Shifts, the last two give their rarest cards to the first two, who \
-give back any. Before that, whoever was dealt two jokers may declare: the last one a Food Fight, which reverses the roles of this exchange, anybody else \
-Dinner is Served, and nothing is exchanged.";
+give back any. Before that, a player who was dealt two jokers may declare something. If it is who came last, this is a Food Fight: all roles are reversed. If it is \
+anybody else, Dinner is Served, and nothing is exchanged.";
 
 /// The rules of one game beside [`RULES`], in a sentence.
 pub fn this_game(rules: Option<&RuleSet>) -> String {

@@ -61,7 +61,7 @@ fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
 }
 
 /// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
-/// ignores so many refusals is disconnected. `client`: `None` behind a proxy.
+/// ignores so many refusals is disconnected, but not behind a proxy (`None`).
 fn too_many_waiting(client: Option<&Arc<Client>>) -> Status {
     let message = match client {
         Some(client) => {

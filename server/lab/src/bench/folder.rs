@@ -132,7 +132,7 @@ impl Folder {
             }
         }
         if folder.lock.is_some() {
-            // Of a run that was killed: whoever gets the folder would get these too.
+            // What a run that was killed has left: whoever gets the folder would get it, too.
             jsonl::remove_unfinished(path).map_err(named)?;
         }
         write_json(&file, &folder.manifest)?;
