@@ -3,7 +3,7 @@
 //! A [`Game`] is created from a validated [`RuleSet`] and a [`Seed`]. It says whose decision is
 //! open ([`Game::decision`]), what is legal ([`Game::legal_actions`]) and what the rules require
 //! ([`Game::requirement`]), applies an [`ActionId`] ([`Game::apply`]), reports [`Event`]s, and
-//! gives each seat its [`Observation`]. [`Event::seen_by`] alone decides what a viewer may see.
+//! gives each seat its [`Observation`]. [`Event::seen_by`] decides what a viewer may see of the cards.
 //!
 //! The rules are in `docs/rules.md`; comments cite its sections as §4.3. No files, sockets, clocks,
 //! serialisation, threads, global randomness or agents live here: on every machine, a game is a

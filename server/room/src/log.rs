@@ -1,4 +1,4 @@
-//! The log of a room: every public event, in order. The number of an event is its position plus
+//! The log of a room: every event as it is, in order. The number of an event is its position plus
 //! one. `convert::event` in `chefshat-wire` redacts events for a viewer.
 
 use std::collections::VecDeque;

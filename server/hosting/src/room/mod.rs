@@ -1,7 +1,7 @@
 //! Rooms. Each is a task that owns one game. `chefshat-room` decides; `task` commits and publishes;
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
 //! which sends it the messages in `message`, or handles an answer in place through `shared`;
-//! `clients` are those that took seats; `observed` counts and traces; `table_view` is what those who
+//! `clients` are those that took seats; `telemetry` counts and traces; `table_view` is what those who
 //! attend to a physical table see, `markers` what the owner follows, `hints` the latest hint.
 
 mod clients;
