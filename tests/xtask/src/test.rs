@@ -183,7 +183,6 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         }),
     ])?;
 
-    let mut lanes: Vec<Lane<'_>> = Vec::new();
     let mut in_rust = TestsInRust::default();
     if wants(Part::Rust) {
         steps.run("find the tests in Rust", || {
@@ -203,32 +202,38 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
                 steps.skip(tests, &failure.to_string());
             }
         }
-        for run in std::mem::take(&mut in_rust.whole) {
-            lanes.push(Box::new(|steps| of_all(steps, [run])));
-        }
     }
     if needs_python {
         steps.run("install the native module", || setup::native_module(places))?;
     }
+
+    // First what takes longest, of which much is waiting: the short ones fill what is left.
+    let mut lanes: Vec<Lane<'_>> = Vec::new();
+    let package = |package: &'static str, options: &'static [&'static str]| -> Lane<'_> {
+        Box::new(move |steps| {
+            let mut runs = vec![pytest(places, package, options)];
+            if slow {
+                runs.push(pytest(places, package, &["-m", "slow"]));
+            }
+            of_all(steps, runs)
+        })
+    };
     if wants(Part::Python) {
-        for package in PYTHON_PACKAGES {
-            // The longest suite has the most processes.
-            let processes: &[&str] = match package {
-                CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
-                DEPLOYMENT => continue,
-                _ => &[],
-            };
-            lanes.push(Box::new(move |steps| {
-                let mut runs = vec![pytest(places, package, processes)];
-                if slow {
-                    runs.push(pytest(places, package, &["-m", "slow"]));
-                }
-                of_all(steps, runs)
-            }));
-        }
+        lanes.push(package(CLIENTS, &["--numprocesses=2", "--dist=loadfile"]));
+    }
+    if deployment {
+        lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
+    }
+    for run in in_rust.whole {
+        lanes.push(Box::new(|steps| of_all(steps, [run])));
     }
     if wants(Part::Web) {
         lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow)));
+    }
+    if wants(Part::Python) {
+        let others = PYTHON_PACKAGES.into_iter();
+        let others = others.filter(|other| ![CLIENTS, DEPLOYMENT].contains(other));
+        lanes.extend(others.map(|other| package(other, &[])));
     }
     if wants(Part::Rust) {
         let mut runs = in_rust.crates;
@@ -239,9 +244,6 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             }
             of_all(steps, runs)
         }));
-    }
-    if deployment {
-        lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
     }
     if wants(Part::Web) {
         lanes.push(Box::new(|steps| web::test(places, steps)));
