@@ -40,7 +40,7 @@ mod policy_args;
 pub mod program;
 pub mod progress;
 mod records;
-mod remote;
+pub mod remote;
 mod room;
 pub mod rules_args;
 mod secret_file;

@@ -83,9 +83,9 @@ pub fn run<C: Commands>() -> ExitCode {
 ///
 /// # Errors
 /// The command failed, or the operating system cannot start the threads.
-pub fn in_runtime(
-    command: impl Future<Output = Result<ExitCode, CommandError>>,
-) -> Result<ExitCode, CommandError> {
+pub fn in_runtime<T>(
+    command: impl Future<Output = Result<T, CommandError>>,
+) -> Result<T, CommandError> {
     runtime()?.block_on(command)
 }
 

@@ -21,7 +21,7 @@ pub(super) const MAX_PACE_MS: u64 = 5_000;
 
 /// A built-in agent that plays a seat of a server. Keeps its random generator from game to game.
 #[derive(Debug)]
-pub(super) struct RemoteAgent {
+pub struct RemoteAgent {
     agent: BuiltInAgent,
     /// Creates the agent of each game, with this seed, when the rules are known.
     maker: Option<(Arc<dyn AgentMaker>, [u8; 32])>,
@@ -32,7 +32,7 @@ pub(super) struct RemoteAgent {
 
 impl RemoteAgent {
     /// Plays as this agent; waits for `pace` before each decision.
-    pub(super) fn new(agent: BuiltInAgent, pace: Duration) -> Self {
+    pub fn new(agent: BuiltInAgent, pace: Duration) -> Self {
         Self {
             agent,
             maker: None,

@@ -1,5 +1,8 @@
 //! `chefshat compare A B`: compares two agents on duplicate deals, which `chefshat-simulation`
-//! plays. The output depends only on what is compared, not on time or the number of threads.
+//! plays, or rooms of a server where one of them is a command. The output depends only on what is
+//! compared, not on time or the number of threads.
+
+mod rooms;
 
 use std::io::Write as _;
 use std::num::NonZeroU32;
@@ -8,17 +11,19 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use chefshat_agents::{AgentNameError, NamedAgent, Network};
+use chefshat_examiner::AgentCommand;
 use chefshat_search::{MARGIN, Searchers};
-use chefshat_simulation::{
-    Comparison, Contender, Duplicate, DuplicateError, Figure, RulesForm, SeatPlan,
-};
+use chefshat_simulation::{Comparison, Contender, Duplicate, Figure, RulesForm, SeatPlan};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
+use tokio_util::task::TaskTracker;
 
 use chefshat_cli::error::CommandError;
 use chefshat_cli::numbers::{counted, signed};
 use chefshat_cli::output::{self, heading, line, table};
+use chefshat_cli::program::in_runtime;
 use chefshat_cli::rules_args::RulesArgs;
+use chefshat_cli::stops::{Stop, Stops};
 use chefshat_cli::{progress, threads};
 
 /// Maximum length of an agent's name in the title.
@@ -27,9 +32,14 @@ const MAX_NAME: usize = 25;
 const MAX_LABEL: usize = 14;
 
 const HELP: &str = "\
-A and B are built-in agents (random, greedy and so on) or network files, as chefshat.learn writes them. Every deal is played \
-in all seatings of the two, so that the cards favour neither. The gain depends on the agents: the last line of the output says how many \
-Shifts of independent deals would give the same precision. A network plays the legal action with the highest output.
+A and B are built-in agents (random, greedy and so on), network files, as chefshat.learn writes them, or commands that start agents in \
+any language. Every deal is played in all seatings of the two, so that the cards favour neither. The gain depends on the agents: the \
+last line of the output says how many Shifts of independent deals would give the same precision. A network plays the legal action with \
+the highest output.
+
+A command is several words in quotes, as for `chefshat bench run`: with {code} it is started for each game and seat, otherwise once for \
+each seat, and reads a line for each game. The games are then played in rooms of a server, on the same deals, some dozens of Shifts a \
+second. An agent that does not play a game by itself to its end ends the comparison.
 
 Figures are per seat and Shift, for a seat of A and for a seat of B. The 95 % interval is 1.96 standard errors to either side of the \
 difference, with deals as independent samples. Roles and exchange begin with the second Shift of a game. All seatings have the same \
@@ -39,6 +49,7 @@ Examples:
   chefshat compare greedy random
   chefshat compare trained.safetensors greedy --deals 500 --seed 7
   chefshat compare deep_q.safetensors random --seats one --preset original2020 --json
+  chefshat compare 'python agent.py' greedy --seats one --deals 50 --shifts 1
 
 The same seed gives the same output, on any number of threads, unless monte_carlo has a budget in milliseconds.";
 
@@ -50,9 +61,9 @@ The same seed gives the same output, on any number of threads, unless monte_carl
     mut_arg("target_shifts", |arg| arg.hide(true))
 )]
 pub(super) struct Compare {
-    /// A built-in agent or a network file. monte_carlo takes a budget for each decision and the
-    /// agent of its rollouts: monte_carlo:50ms or monte_carlo:400:greedy (rollouts). With :belief, as in
-    /// monte_carlo:50ms:belief, it guesses hands from what the others did.
+    /// A built-in agent, a network file, or a command in quotes. monte_carlo takes a budget for each
+    /// decision and the agent of its rollouts: monte_carlo:50ms or monte_carlo:400:greedy (rollouts).
+    /// With :belief, as in monte_carlo:50ms:belief, it guesses hands from what the others did.
     a: String,
     /// The agent to compare it with.
     b: String,
@@ -71,6 +82,13 @@ pub(super) struct Compare {
     /// Number of threads, at most 256 and one per deal; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
+    /// For a command: games that are open at a time. Only for agents that play several at a time.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    parallel: u16,
+    /// For a command: a server to play on; CHEFSHAT_TOKEN and CHEFSHAT_CA are for it and for the agents.
+    /// Default: one in this process.
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -105,21 +123,26 @@ impl Compare {
             );
         }
         let rules = self.rules.rules()?;
-        let entrants = [Entrant::of(&self.a)?, Entrant::of(&self.b)?];
+        let sides = [Side::of(&self.a)?, Side::of(&self.b)?];
         let plan = match self.seats {
             SeatsFlag::Half => SeatPlan::Half,
             SeatsFlag::One => SeatPlan::One,
         };
-        let contenders = entrants.each_ref().map(|entrant| entrant.contender.clone());
-        let duplicate = Duplicate::new(rules, self.shifts, contenders, plan, self.deals, self.seed)
-            .map_err(|error| self.explained(error))?;
-        let bar = progress::of_items(self.deals, "deals");
-        let pool = threads::pool(self.threads, self.deals)?;
-        let comparison = pool.install(|| duplicate.run(&|deals| bar.inc(deals)));
-        bar.finish_and_clear();
+        let duplicate = Duplicate::new(rules, self.shifts, plan, self.deals, self.seed)
+            .map_err(|error| format!("--deals: {error}"))?;
+        for side in &sides {
+            side.check(&duplicate)?;
+        }
+        let comparison = match &sides {
+            [Side::Here(a), Side::Here(b)] => self.play_here(&duplicate, [a, b])?,
+            sides => match in_runtime(self.play_in_rooms(&duplicate, sides))? {
+                Ok(comparison) => comparison,
+                Err(stop) => return Ok(stop.exit_code()),
+            },
+        };
         let played = Played {
             compare: &self,
-            entrants: &entrants,
+            sides: &sides,
             duplicate: &duplicate,
             comparison: &comparison,
         };
@@ -132,13 +155,118 @@ impl Compare {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn explained(&self, error: DuplicateError) -> String {
-        match error {
-            DuplicateError::Deals(_) => format!("--deals: {error}"),
-            DuplicateError::DoesNotFit { who, .. } => {
-                let given = if who == "A" { &self.a } else { &self.b };
-                format!("{given}: {error}: change --players, --faces or --jokers")
+    /// Plays the games of agents of this process.
+    fn play_here(
+        &self,
+        duplicate: &Duplicate,
+        entrants: [&Entrant; 2],
+    ) -> Result<Comparison, CommandError> {
+        if self.server.is_some() {
+            return Err("--server: these agents play in this process; it is for commands".into());
+        }
+        let contenders = entrants.map(|entrant| entrant.contender.clone());
+        let bar = progress::of_items(self.deals, "deals");
+        let pool = threads::pool(self.threads, self.deals)?;
+        let comparison = pool.install(|| duplicate.run(&contenders, &|deals| bar.inc(deals)))?;
+        bar.finish_and_clear();
+        Ok(comparison)
+    }
+
+    /// Plays the games of commands, until somebody stops the program.
+    async fn play_in_rooms(
+        &self,
+        duplicate: &Duplicate,
+        sides: &[Side; 2],
+    ) -> Result<Result<Comparison, Stop>, CommandError> {
+        let mut stops = Stops::catch()?;
+        let closing = TaskTracker::new();
+        let players = sides.each_ref().map(Side::player);
+        let (server, parallel) = (self.server.as_deref(), usize::from(self.parallel));
+        let playing = rooms::run(duplicate, &players, server, parallel, &closing);
+        tokio::select! {
+            comparison = playing => comparison.map(Ok),
+            // The agents' processes, which are in process groups of their own, end with what plays them.
+            stop = stops.next() => {
+                closing.close();
+                closing.wait().await;
+                Ok(Err(stop))
             }
+        }
+    }
+}
+
+/// An agent that is compared.
+enum Side {
+    /// It plays in this process.
+    Here(Entrant),
+    /// A command starts it.
+    Command {
+        /// As given on the command line.
+        given: String,
+        command: AgentCommand,
+    },
+}
+
+impl Side {
+    /// Reads a built-in agent, a network file, or else a command of several words.
+    fn of(given: &str) -> Result<Self, CommandError> {
+        let is_command = given.contains([' ', '{']) && !Path::new(given).exists();
+        if !is_command {
+            return Ok(Self::Here(Entrant::of(given)?));
+        }
+        let words = shlex::split(given).filter(|words| !words.is_empty());
+        let words = words.ok_or_else(|| format!("{given}: a quote is missing in the command"))?;
+        let command = AgentCommand::for_games(words);
+        Ok(Self::Command {
+            given: given.to_owned(),
+            command: command.map_err(|error| format!("{given}: {error}"))?,
+        })
+    }
+
+    /// Refuses a network that was trained for other games.
+    fn check(&self, duplicate: &Duplicate) -> Result<(), CommandError> {
+        let Self::Here(entrant) = self else {
+            return Ok(());
+        };
+        let checked = duplicate.check(&entrant.contender);
+        Ok(checked.map_err(|error| {
+            let given = &entrant.given;
+            format!("{given}: {error}: change --players, --faces or --jokers")
+        })?)
+    }
+
+    /// Who plays in rooms.
+    fn player(&self) -> rooms::Player {
+        match self {
+            Self::Here(entrant) => rooms::Player::Here(entrant.contender.clone()),
+            Self::Command { command, .. } => {
+                let program = command.words().first().map_or("", String::as_str);
+                let name = Path::new(program).file_name().unwrap_or_default();
+                let name = name.to_string_lossy().chars().take(MAX_NAME).collect();
+                rooms::Player::Program(command.clone(), name)
+            }
+        }
+    }
+
+    /// Short name for the title and tables.
+    fn label(&self) -> &str {
+        match self {
+            Self::Here(entrant) => &entrant.label,
+            Self::Command { given, .. } => given,
+        }
+    }
+
+    fn search(&self) -> Option<&Searchers> {
+        match self {
+            Self::Here(entrant) => entrant.search.as_ref(),
+            Self::Command { .. } => None,
+        }
+    }
+
+    fn json(&self) -> Value {
+        match self {
+            Self::Here(entrant) => entrant_json(entrant),
+            Self::Command { given, .. } => json!({"command": given}),
         }
     }
 }
@@ -192,7 +320,7 @@ impl Entrant {
 /// A finished comparison.
 struct Played<'c> {
     compare: &'c Compare,
-    entrants: &'c [Entrant; 2],
+    sides: &'c [Side; 2],
     duplicate: &'c Duplicate,
     comparison: &'c Comparison,
 }
@@ -201,7 +329,7 @@ impl Played<'_> {
     /// The result as one JSON object.
     fn json(&self) -> Value {
         let comparison = self.comparison;
-        let [a, b] = self.entrants.each_ref().map(entrant_json);
+        let [a, b] = self.sides.each_ref().map(Side::json);
         json!({
             "a": a,
             "b": b,
@@ -226,10 +354,7 @@ impl Played<'_> {
     fn text(&self) -> String {
         let comparison = self.comparison;
         let mut text = String::new();
-        let [a, b] = self
-            .entrants
-            .each_ref()
-            .map(|entrant| shortened(&entrant.label, MAX_NAME));
+        let [a, b] = (self.sides.each_ref()).map(|side| shortened(side.label(), MAX_NAME));
         let seed = self.compare.seed;
         heading(
             &mut text,
@@ -294,11 +419,7 @@ impl Played<'_> {
         });
         table(&mut text, &header, &[0], rows.into_iter());
         text.push('\n');
-        for search in self
-            .entrants
-            .iter()
-            .filter_map(|entrant| entrant.search.as_ref())
-        {
+        for search in self.sides.iter().filter_map(Side::search) {
             line(&mut text, &searched(search));
         }
         line(&mut text, &self.gain());
@@ -319,10 +440,7 @@ impl Played<'_> {
 
     /// Column headings of the two agents: their names, or A and B if these are equal.
     fn columns(&self) -> [String; 2] {
-        let [a, b] = self
-            .entrants
-            .each_ref()
-            .map(|entrant| shortened(&entrant.label, MAX_LABEL));
+        let [a, b] = (self.sides.each_ref()).map(|side| shortened(side.label(), MAX_LABEL));
         if a == b {
             ["A".to_owned(), "B".to_owned()]
         } else {

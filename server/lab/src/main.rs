@@ -1,6 +1,7 @@
 //! `chefshat-lab`: what needs datasets, pictures, simulations or examinations, beside all commands of
 //! `chefshat`, which starts it for these.
 
+mod agent_host;
 mod bench;
 mod check_agent;
 mod compare;

@@ -93,16 +93,9 @@ fn compared(arguments: &Arguments) -> Comparison {
     };
     let contenders = [Contender::Made(agent), Contender::Kind(AgentKind::Trained)];
     let (plan, deals) = (SeatPlan::One, arguments.deals);
-    Duplicate::new(
-        rules,
-        arguments.shifts,
-        contenders,
-        plan,
-        deals,
-        arguments.seed,
-    )
-    .expect("valid contenders")
-    .run(&|_| {})
+    Duplicate::new(rules, arguments.shifts, plan, deals, arguments.seed)
+        .and_then(|duplicate| duplicate.run(&contenders, &|_| {}))
+        .expect("valid contenders")
 }
 
 /// Agents that share rollouts by PUCT.

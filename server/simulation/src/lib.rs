@@ -32,7 +32,7 @@ pub mod vector;
 pub use batch::{Batch, BatchError};
 pub use duplicate::{
     Candidate, Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, SameSeat,
-    SeatPlan, Seating,
+    SeatPlan, Seating, Tally,
 };
 pub use fold::Progress;
 pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};

@@ -1,41 +1,27 @@
 //! An agent in any language plays on a server, in a room for each deal. The records are the server's.
 
-use std::env;
 use std::pin::pin;
-use std::process::ExitStatus;
 use std::time::Duration;
 
 use chefshat_benchmark::check;
-use chefshat_cli::connect::ServerArg;
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, tell};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::progress;
-use chefshat_client::{Client, Error};
-use chefshat_examiner::{AgentCommand, AgentProcess, Placeholders};
+use chefshat_client::Client;
+use chefshat_examiner::{AgentCommand, AgentProcess};
 use chefshat_proto::v1::{self, game_event::Kind};
 use chefshat_record::jsonl;
-use chefshat_server::host::Host;
 use futures::{StreamExt as _, stream};
 use tokio::io::AsyncWriteExt as _;
 use tokio::process::ChildStdin;
 use tokio::sync::Mutex;
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
 use tokio_util::task::TaskTracker;
 
 use super::folder::Folder;
+use crate::agent_host::{AgentHost, END, EXIT, exited, explained, game_line, patience, record};
 use crate::open_room::OpenRoom;
 
-/// Lines of the agent's output that an error shows.
-const LAST_LINES: usize = 8;
-/// How long an agent may take to exit after its last game.
-const EXIT: Duration = Duration::from_secs(10);
-/// How long a game may take to end after the process of its agent has exited, and a call to clean up.
-const END: Duration = Duration::from_secs(5);
-/// The same, if the process says that it has failed.
-const FAILED: Duration = Duration::from_millis(500);
-/// How often a record is asked for that the server does not have yet, and how long to wait between.
-const ATTEMPTS: u32 = 20;
-const PAUSE: Duration = Duration::from_millis(250);
 /// How long no game may end until the person at the terminal is asked about the agent.
 const QUIET: Duration = Duration::from_secs(30);
 /// Failures in a row that end a run.
@@ -55,43 +41,26 @@ pub(super) async fn play(
     if deals.is_empty() {
         return Ok(());
     }
-    let host = match server {
-        Some(_) => None,
-        None => Some(Host::in_memory(None).await?),
-    };
-    let own = host.as_ref().map(Host::url);
-    let url = server.map(str::to_owned).or(own).unwrap_or_default();
-    // The process of the agent inherits these variables.
-    let token = env::var("CHEFSHAT_TOKEN").ok();
-    let ca = env::var_os("CHEFSHAT_CA").map(Into::into);
-    let client = ServerArg::new(url.clone(), token, ca).connect().await?;
+    let host = AgentHost::open(server).await?;
     let games = Games {
         folder,
         command,
-        client: &client,
+        host: &host,
         closing,
-        // With TLS an agent must see the scheme.
-        address: url.trim_start_matches("http://").trim_end_matches('/'),
     };
     let played = games.play(deals, parallel).await;
     closing.close();
     closing.wait().await;
     played?;
-    drop(client);
-    if let Some(host) = host {
-        host.stop().await?;
-    }
-    Ok(())
+    host.close().await
 }
 
 /// The games of a run.
 struct Games<'a> {
     folder: &'a Folder,
     command: &'a AgentCommand,
-    client: &'a Client,
+    host: &'a AgentHost,
     closing: &'a TaskTracker,
-    /// `host:port` of the server, or its URL with TLS.
-    address: &'a str,
 }
 
 impl Games<'_> {
@@ -120,6 +89,12 @@ impl Games<'_> {
         Ok(())
     }
 
+    async fn start(&self, code: String) -> Result<AgentProcess, CommandError> {
+        self.host
+            .start(self.command, self.folder.name(), code)
+            .await
+    }
+
     async fn play_each(
         &self,
         deals: Vec<usize>,
@@ -137,7 +112,7 @@ impl Games<'_> {
                 Err(_) => {
                     let words =
                         "no game has ended for half a minute; does the agent join and decide?";
-                    bar.suspend(|| anstream::eprintln!("{words}"));
+                    bar.suspend(|| tell(words));
                     games.next().await
                 }
             };
@@ -155,12 +130,14 @@ impl Games<'_> {
                     format!("{games} failed in a row; that of deal {deal}: {error}").into(),
                 );
             }
-            bar.suspend(|| anstream::eprintln!("the game of deal {deal}: {error}"));
+            bar.suspend(|| tell(format_args!("the game of deal {deal}: {error}")));
         }
         bar.finish_and_clear();
         if failed > 0 {
             let games = counted(failed, "game");
-            anstream::eprintln!("{games} failed; the same command plays what is missing");
+            tell(format_args!(
+                "{games} failed; the same command plays what is missing"
+            ));
         }
         Ok(())
     }
@@ -172,10 +149,10 @@ impl Games<'_> {
         reads: Option<&Mutex<ChildStdin>>,
     ) -> Result<(), CommandError> {
         let request = self.folder.task.room(deal);
-        let (created, open) = OpenRoom::create(self.client, self.closing, request).await?;
+        let (created, open) = OpenRoom::create(&self.host.client, self.closing, request).await?;
         let room = created.room.unwrap_or_default();
         // Games of hidden deals are private.
-        let owner = self.client.with_secrets([&created.owner_token])?;
+        let owner = self.host.client.with_secrets([&created.owner_token])?;
         self.until_over(&owner, &room, created.join_code, reads)
             .await?;
         open.leave_open();
@@ -197,7 +174,7 @@ impl Games<'_> {
     ) -> Result<(), CommandError> {
         let over = until_ended(owner, &room.room_id);
         if let Some(reads) = reads {
-            let line = format!("{} {code} {}\n", self.address, self.folder.name());
+            let line = game_line(&self.host.address, &code, self.folder.name());
             let written = reads.lock().await.write_all(line.as_bytes()).await;
             written.map_err(|error| format!("the agent reads no more games: {error}"))?;
             return over.await;
@@ -208,8 +185,7 @@ impl Games<'_> {
             ended = &mut over => ended,
             status = process.ended() => {
                 let status = status?;
-                let patience = if status.success() { END } else { FAILED };
-                timeout(patience, over).await.unwrap_or_else(|_| Err(exited(status)))
+                timeout(patience(status), over).await.unwrap_or_else(|_| Err(exited(status)))
             }
         };
         if let Err(error) = ended {
@@ -217,17 +193,6 @@ impl Games<'_> {
         }
         let _exited = timeout(EXIT, process.ended()).await;
         Ok(())
-    }
-
-    async fn start(&self, code: String) -> Result<AgentProcess, CommandError> {
-        let places = Placeholders {
-            address: self.address.to_owned(),
-            code,
-            name: self.folder.name().to_owned(),
-        };
-        let started = AgentProcess::start(self.command, &places, None).await;
-        let program = self.command.words().first();
-        Ok(started.map_err(|error| format!("{}: {error}", program.map_or("", String::as_str)))?)
     }
 }
 
@@ -242,29 +207,4 @@ async fn until_ended(client: &Client, room_id: &str) -> Result<(), CommandError>
         true => Ok(()),
         false => Err("the room was closed; the agent has an hour to join".into()),
     }
-}
-
-/// The record of a game that has ended. The server may need a moment to have it.
-async fn record(client: &Client, game_id: &str) -> Result<Vec<v1::RecordLine>, Error> {
-    for _ in 1..ATTEMPTS {
-        match client.record(game_id).await {
-            Err(error) if error.reason() == Some("GAME_RUNNING") => sleep(PAUSE).await,
-            record => return record,
-        }
-    }
-    client.record(game_id).await
-}
-
-fn exited(status: ExitStatus) -> CommandError {
-    format!("the agent exited before the end: {status}").into()
-}
-
-/// An error with the last lines that the agent printed.
-async fn explained(error: CommandError, process: AgentProcess) -> CommandError {
-    let lines = process.finish(LAST_LINES).await;
-    if lines.is_empty() {
-        return error;
-    }
-    let lines: String = lines.iter().map(|line| format!("\n  | {line}")).collect();
-    format!("{error}; the agent's last lines:{lines}").into()
 }

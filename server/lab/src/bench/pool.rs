@@ -1,6 +1,7 @@
 //! `chefshat bench pool`: the reference results. Built-in agents, and network files that are named,
 //! play all tasks, and one seat of each against three of each other on duplicate deals.
 
+use std::io::Write as _;
 use std::num::NonZeroU32;
 use std::process::ExitCode;
 
@@ -59,7 +60,7 @@ impl Pool {
         }
         let mut text = report::table_text(&results, &versus);
         self.cross_text(&mut text, &entrants, &pairs);
-        anstream::print!("{text}");
+        write!(anstream::stdout().lock(), "{text}")?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -101,14 +102,12 @@ impl Pool {
         let fitting: Vec<_> = fitting.collect();
         let count = fitting.len() * fitting.len().saturating_sub(1);
         let bar = progress::of_items(count as u64 * self.deals, "deals");
+        let duplicate = Duplicate::new(rules, NonZeroU32::MIN, SeatPlan::One, self.deals, 0)?;
         let mut pairs = Vec::with_capacity(count);
         for &(row, one) in &fitting {
             for &(column, others) in fitting.iter().filter(|(it, _)| *it != row) {
                 let contenders = [one.contender.clone(), others.contender.clone()];
-                let plan = SeatPlan::One;
-                let duplicate =
-                    Duplicate::new(rules, NonZeroU32::MIN, contenders, plan, self.deals, 0)?;
-                let points = duplicate.run(&|deals| bar.inc(deals)).points;
+                let points = duplicate.run(&contenders, &|deals| bar.inc(deals))?.points;
                 pairs.push(Pair {
                     row,
                     column,

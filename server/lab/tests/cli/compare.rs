@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, typed};
+use super::run::{Ended, chefshat, typed};
 
 /// Networks with random weights.
 const TABLE: &str = concat!(
@@ -161,7 +161,7 @@ fn mistakes_are_explained() {
             SMALL,
             "greedy",
             "",
-            "A was trained for 3 players, 5 faces and hands of 5 cards",
+            "it was trained for 3 players, 5 faces and hands of 5 cards",
         ),
         (SMALL, "greedy", "", "change --players, --faces or --jokers"),
         (
@@ -188,6 +188,64 @@ fn mistakes_are_explained() {
         "--deals 2 --players 3 --faces 5 --jokers 1",
     )
     .well();
+}
+
+#[test]
+fn a_command_has_the_result_that_its_agent_has_in_this_process() {
+    const AGENT: &str = env!("CARGO_BIN_EXE_chefshat-lab");
+    let compared = |a: &str, b: &str, seats: &str| {
+        let flags = [
+            "--deals", "2", "--shifts", "2", "--seed", "7", "--seats", seats,
+        ];
+        let mut result = chefshat(&[&["compare", a, b, "--json"], &flags[..]].concat())
+            .well()
+            .json();
+        assert_eq!(result["deals"], 2);
+        let sides = ["a", "b"].map(|side| result[side].take());
+        (result, sides)
+    };
+    let each_game = format!("{AGENT} agent greedy --server {{url}} --code {{code}}");
+    let reads_games = format!(
+        "sh -c 'while read address code name; do {AGENT} agent greedy --server http://$address --code $code; done'"
+    );
+    // Agents of this process draw the same numbers there.
+    let (here, _) = compared("greedy", "random", "half");
+    let (each, sides) = compared(&each_game, "random", "half");
+    assert_eq!(each, here);
+    assert_eq!(sides[0]["command"], *each_game);
+    let (reads, _) = compared("random", &reads_games, "one");
+    let (one, _) = compared("random", "greedy", "one");
+    assert_eq!(reads, one);
+    let (networks, _) = compared(TABLE, &each_game, "one");
+    assert_eq!(networks, compared(TABLE, "greedy", "one").0);
+    let (same, _) = compared(&each_game, &reads_games, "half");
+    assert_eq!(same["points_per_shift"]["difference"], 0.0);
+}
+
+#[test]
+fn a_command_that_does_not_play_ends_the_comparison() {
+    for (command, expected) in [
+        (
+            "sh -c 'echo no seat; exit 3'",
+            "the agent's last lines:\n  | no seat",
+        ),
+        (
+            "sh -c 'exit 3' {address} {code}",
+            "the agent exited before the end: exit status: 3",
+        ),
+        ("sh -c '", "a quote is missing"),
+        (
+            "agent {code}",
+            "the command needs {address} (host:port) or {url}",
+        ),
+        ("agent {tournament}", "{tournament} has no value here"),
+        ("no-such-program --code {code} {url}", "no-such-program: "),
+    ] {
+        let flags = ["--deals", "2", "--shifts", "1"];
+        let ended = chefshat(&[&["compare", "greedy", command], &flags[..]].concat());
+        ended.assert_failed(expected);
+    }
+    compare("greedy", "random", "--server http://127.0.0.1:1").assert_failed("it is for commands");
 }
 
 #[test]

@@ -148,9 +148,19 @@ impl Figure {
 }
 
 /// Sums of one game over the Shifts, for the seats of A and of B.
-#[derive(Debug, Default)]
-pub(super) struct Tally {
-    pub(super) points: [u64; 2],
-    pub(super) places: [u64; 2],
-    pub(super) wins: [u64; 2],
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    points: [u64; 2],
+    places: [u64; 2],
+    wins: [u64; 2],
+}
+
+impl Tally {
+    /// Adds a seat's Shift: its points, and its place, from 1.
+    pub fn add(&mut self, is_a: bool, points: u64, place: u64) {
+        let whose = usize::from(!is_a);
+        self.points[whose] += points;
+        self.places[whose] += place;
+        self.wins[whose] += u64::from(place == 1);
+    }
 }

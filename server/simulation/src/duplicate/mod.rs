@@ -14,7 +14,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use chefshat_engine::{
-    Event, MAX_SEATS, MetricsRecorder, RuleSet, RuleSetSpec, Seat, Standings, Stop,
+    Event, MAX_SEATS, MetricsRecorder, RuleSet, RuleSetSpec, Seat, Seed, Standings, Stop,
 };
 use thiserror::Error;
 
@@ -24,8 +24,7 @@ use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{
     AgentKind, AgentMaker, BuiltInAgent, Listener, Network, game_seed, play_agents,
 };
-use figures::Tally;
-pub use figures::{Comparison, Figure};
+pub use figures::{Comparison, Figure, Tally};
 pub use same_seat::{Candidate, Measured, SameSeat};
 
 /// Deals played by one thread at a time. Part of the result: it decides how figures are grouped for
@@ -95,7 +94,7 @@ impl SeatPlan {
     }
 }
 
-/// A comparison of two agents on duplicate deals.
+/// The games of a comparison of two agents on duplicate deals.
 ///
 /// Game `d` has the deal of game `d` of a [`crate::Batch`] with the same seed, in every seating.
 /// Only deals are duplicated: agents have their own generators for each seating and seat.
@@ -103,7 +102,6 @@ impl SeatPlan {
 pub struct Duplicate {
     rules: RuleSet,
     shifts: NonZeroU32,
-    contenders: [Contender; 2],
     seatings: Vec<Seating>,
     deals: u64,
     seed: u64,
@@ -117,11 +115,9 @@ pub enum DuplicateError {
     Deals(u64),
     /// A network does not fit the rules, so that it would play as `greedy`.
     #[error(
-        "{who} was trained for {players} players, {faces} faces and hands of {hand_size} cards, and cannot play games of another size"
+        "it was trained for {players} players, {faces} faces and hands of {hand_size} cards, and cannot play games of another size"
     )]
     DoesNotFit {
-        /// `A` or `B`.
-        who: &'static str,
         /// Players it was trained for.
         players: u8,
         /// Faces it was trained for.
@@ -136,11 +132,10 @@ impl Duplicate {
     /// `plan`. The stop rule of `rules` is ignored. `seed` determines all randomness.
     ///
     /// # Errors
-    /// If there are fewer than two deals, or a network does not fit the rules.
+    /// If there are fewer than two deals.
     pub fn new(
         rules: RuleSet,
         shifts: NonZeroU32,
-        contenders: [Contender; 2],
         plan: SeatPlan,
         deals: u64,
         seed: u64,
@@ -155,23 +150,9 @@ impl Duplicate {
         let rules = spec
             .validate()
             .expect("a rule set is valid with any number of Shifts");
-        for (who, contender) in ["A", "B"].into_iter().zip(&contenders) {
-            if let Contender::Network(network) = contender
-                && !network.fits(&rules)
-            {
-                let info = network.info();
-                return Err(DuplicateError::DoesNotFit {
-                    who,
-                    players: info.players,
-                    faces: info.faces,
-                    hand_size: info.hand_size,
-                });
-            }
-        }
         Ok(Duplicate {
             rules,
             shifts,
-            contenders,
             seatings: plan.seatings(rules.players()),
             deals,
             seed,
@@ -183,61 +164,122 @@ impl Duplicate {
         &self.rules
     }
 
+    /// Number of deals.
+    pub fn deals(&self) -> u64 {
+        self.deals
+    }
+
     /// The seatings in which every deal is played.
     pub fn seatings(&self) -> &[Seating] {
         &self.seatings
+    }
+
+    /// The game seed of a deal, by its index from 0.
+    pub fn game_seed(&self, deal: u64) -> Seed {
+        game_seed(self.seed, deal)
+    }
+
+    /// The agent of a contender on a seat, for one deal in one seating, both by index from 0.
+    pub fn agent(
+        &self,
+        contender: &Contender,
+        deal: u64,
+        seating: usize,
+        seat: Seat,
+    ) -> BuiltInAgent {
+        let seed = seating_agent_seed(self.game_seed(deal), seating, seat);
+        contender.agent(&self.rules, seed)
+    }
+
+    /// Refuses a network that does not fit the rules.
+    ///
+    /// # Errors
+    /// It was trained for games of another size.
+    pub fn check(&self, contender: &Contender) -> Result<(), DuplicateError> {
+        match contender {
+            Contender::Network(network) if !network.fits(&self.rules) => {
+                let info = network.info();
+                Err(DuplicateError::DoesNotFit {
+                    players: info.players,
+                    faces: info.faces,
+                    hand_size: info.hand_size,
+                })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Plays one deal in one seating, both by index from 0, exactly as within the comparison.
     ///
     /// # Panics
     /// If there is no such seating.
-    pub fn play_game(&self, deal: u64, seating: usize, listener: &mut impl Listener) -> Standings {
-        let seed = game_seed(self.seed, deal);
+    pub fn play_game(
+        &self,
+        contenders: &[Contender; 2],
+        deal: u64,
+        seating: usize,
+        listener: &mut impl Listener,
+    ) -> Standings {
         let seats = self.seatings[seating];
         // An array, because agents with their generators are not `Copy`.
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
-            let contender = &self.contenders[usize::from(!seats.is_a(seat))];
-            contender.agent(&self.rules, seating_agent_seed(seed, seating, seat))
+            let contender = &contenders[usize::from(!seats.is_a(seat))];
+            self.agent(contender, deal, seating, seat)
         });
-        play_agents(self.rules, seed, None, &mut agents, listener)
+        play_agents(
+            self.rules,
+            self.game_seed(deal),
+            None,
+            &mut agents,
+            listener,
+        )
     }
 
     /// Plays all games on the current rayon pool and returns the totals. `progress` is called from
     /// any thread with the number of deals finished since its last call.
-    pub fn run(&self, progress: Progress<'_>) -> Comparison {
-        let empty = || Comparison::empty(self.seatings.len());
-        fold_in_order(
-            self.deals,
-            CHUNK,
-            empty,
-            |comparison, deal| {
-                self.add_deal(comparison, deal);
-                progress(1);
-            },
-            |comparison, more| comparison.merge(&more),
-        )
-    }
-
-    fn add_deal(&self, comparison: &mut Comparison, deal: u64) {
-        let games: Vec<Tally> = (0..self.seatings.len())
-            .map(|seating| {
+    ///
+    /// # Errors
+    /// If a network does not fit the rules.
+    pub fn run(
+        &self,
+        contenders: &[Contender; 2],
+        progress: Progress<'_>,
+    ) -> Result<Comparison, DuplicateError> {
+        contenders
+            .iter()
+            .try_for_each(|contender| self.check(contender))?;
+        Ok(self.total(|deal| {
+            let games = self.seatings.iter().enumerate().map(|(seating, seats)| {
                 let mut counter = Counter {
                     recorder: MetricsRecorder::new(self.rules, None),
-                    seating: self.seatings[seating],
+                    seating: *seats,
                     tally: Tally::default(),
                 };
-                self.play_game(deal, seating, &mut counter);
+                self.play_game(contenders, deal, seating, &mut counter);
                 counter.tally
-            })
-            .collect();
-        // Seats times Shifts of this deal, for each agent.
+            });
+            let games = games.collect();
+            progress(1);
+            games
+        }))
+    }
+
+    /// The totals of games, of which `games` has those of a deal, one for each seating. It is called
+    /// from any thread of the current rayon pool.
+    pub fn total(&self, games: impl Fn(u64) -> Vec<Tally> + Sync) -> Comparison {
+        // Seats times Shifts of a deal, for each agent.
         let a_seats: usize = self.seatings.iter().map(|seating| seating.a_seats()).sum();
         let seats = self.seatings.len() * self.rules.players();
         let shifts = f64::from(self.shifts.get());
         let weights = [a_seats, seats - a_seats].map(|seats| seats as f64 * shifts);
-        comparison.add_deal(&games, self.shifts, weights);
+        fold_in_order(
+            self.deals,
+            CHUNK,
+            || Comparison::empty(self.seatings.len()),
+            |comparison, deal| comparison.add_deal(&games(deal), self.shifts, weights),
+            |comparison, more| comparison.merge(&more),
+        )
     }
 }
 
@@ -254,10 +296,9 @@ impl Listener for Counter {
             return;
         };
         for (seat, metrics) in shift.seats.iter() {
-            let whose = usize::from(!self.seating.is_a(seat));
-            self.tally.points[whose] += u64::from(metrics.points);
-            self.tally.places[whose] += u64::from(metrics.place);
-            self.tally.wins[whose] += u64::from(metrics.place == 1);
+            let is_a = self.seating.is_a(seat);
+            self.tally
+                .add(is_a, metrics.points.into(), metrics.place.into());
         }
     }
 }

@@ -23,21 +23,16 @@ fn rules_for(players: u8) -> RuleSet {
     spec.validate().unwrap()
 }
 
-fn duplicate(
-    contenders: [Contender; 2],
-    plan: SeatPlan,
-    players: u8,
-    deals: u64,
-) -> Result<Duplicate, DuplicateError> {
+fn duplicate(plan: SeatPlan, players: u8, deals: u64) -> Duplicate {
     let shifts = NonZeroU32::new(3).unwrap();
-    Duplicate::new(rules_for(players), shifts, contenders, plan, deals, 9)
+    Duplicate::new(rules_for(players), shifts, plan, deals, 9).unwrap()
 }
 
 fn compared(a: AgentKind, b: AgentKind, plan: SeatPlan, players: u8, deals: u64) -> Comparison {
     let contenders = [Contender::Kind(a), Contender::Kind(b)];
-    duplicate(contenders, plan, players, deals)
+    duplicate(plan, players, deals)
+        .run(&contenders, &|_| {})
         .unwrap()
-        .run(&|_| {})
 }
 
 /// A network that plays turns by a fixed order of preference: the highest action first, which sheds
@@ -163,7 +158,7 @@ fn means_add_up_to_the_totals_of_a_shift() {
 #[test]
 fn duplicate_deals_reduce_the_error() {
     let contenders = [Contender::Kind(Greedy), careless()];
-    let comparison = duplicate(contenders, Half, 4, 200).unwrap().run(&|_| {});
+    let comparison = duplicate(Half, 4, 200).run(&contenders, &|_| {}).unwrap();
     let points = &comparison.points;
     assert!(points.standard_error() > 0.0);
     assert!(
@@ -195,10 +190,10 @@ impl Listener for Deals {
 #[test]
 fn deals_are_the_same_in_all_seatings_and_random_choices_are_not() {
     let contenders = [Contender::Kind(Random), Contender::Kind(Random)];
-    let duplicate = duplicate(contenders, Half, 4, 2).unwrap();
+    let duplicate = duplicate(Half, 4, 2);
     let game = |deal, seating| {
         let mut deals = Deals::default();
-        duplicate.play_game(deal, seating, &mut deals);
+        duplicate.play_game(&contenders, deal, seating, &mut deals);
         deals
     };
     let first = game(0, 0);
@@ -233,15 +228,16 @@ fn deals_are_the_same_in_all_seatings_and_random_choices_are_not() {
 #[test]
 fn any_number_of_threads_gives_the_same_figures_and_progress_counts_every_deal() {
     let contenders = [Contender::Kind(Greedy), careless()];
-    let duplicate = duplicate(contenders, One, 4, 33).unwrap();
+    let duplicate = duplicate(One, 4, 33);
     let runs = [1, 2, 3].map(|threads| {
         let finished = AtomicU64::new(0);
         let pool = ThreadPoolBuilder::new().num_threads(threads).build();
         let comparison = pool.unwrap().install(|| {
-            duplicate.run(&|deals| {
+            duplicate.run(&contenders, &|deals| {
                 finished.fetch_add(deals, Ordering::Relaxed);
             })
         });
+        let comparison = comparison.unwrap();
         assert_eq!(finished.into_inner(), 33);
         comparison
     });
@@ -269,15 +265,18 @@ fn a_small_comparison_has_these_numbers() {
 
 #[test]
 fn invalid_comparisons_are_refused() {
-    let greedy = || Contender::Kind(Greedy);
+    let shifts = NonZeroU32::MIN;
     for deals in [0, 1] {
-        let refused = duplicate([greedy(), greedy()], Half, 4, deals).unwrap_err();
+        let refused = Duplicate::new(rules_for(4), shifts, Half, deals, 9).unwrap_err();
         assert_eq!(refused, DuplicateError::Deals(deals));
     }
-    for (contenders, who) in [([careless(), greedy()], "A"), ([greedy(), careless()], "B")] {
-        let refused = duplicate(contenders, Half, 5, 10).unwrap_err();
-        let expected = format!("{who} was trained for 4 players, 11 faces and hands of 17 cards");
-        assert!(refused.to_string().starts_with(&expected), "{refused}");
+    let greedy = || Contender::Kind(Greedy);
+    for contenders in [[careless(), greedy()], [greedy(), careless()]] {
+        let refused = duplicate(Half, 5, 10)
+            .run(&contenders, &|_| {})
+            .unwrap_err();
+        let expected = "it was trained for 4 players, 11 faces and hands of 17 cards";
+        assert!(refused.to_string().starts_with(expected), "{refused}");
     }
 }
 
@@ -286,7 +285,7 @@ fn the_trained_agent_is_stronger_than_greedy() {
     let contenders = [AgentKind::Trained, Greedy].map(Contender::Kind);
     let rules = RuleSetSpec::default().validate().unwrap();
     let shifts = NonZeroU32::new(4).unwrap();
-    let comparison = Duplicate::new(rules, shifts, contenders, Half, 40, 0);
-    let points = comparison.unwrap().run(&|_| {}).points;
+    let duplicate = Duplicate::new(rules, shifts, Half, 40, 0).unwrap();
+    let points = duplicate.run(&contenders, &|_| {}).unwrap().points;
     assert!(points.interval95().low > 0.5, "{points:?}");
 }
