@@ -11,12 +11,13 @@ mod report;
 mod run;
 mod series;
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_agents::NamedAgent;
 use chefshat_benchmark::{BENCHMARK, DealsKey, Task, TaskResult, tasks};
-use chefshat_cli::error::{CommandError, say};
+use chefshat_cli::error::{CommandError, say, tell};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line, rules_in_short};
 use chefshat_cli::program::in_runtime;
@@ -112,7 +113,7 @@ impl Tasks {
             let deals = counted(task.deals as u64, "deal");
             line(&mut text, &format!("{deals}, {seconds} s for a decision"));
         }
-        anstream::print!("{text}");
+        write!(anstream::stdout().lock(), "{text}")?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -175,7 +176,7 @@ impl TableCommand {
             match folder::read_result(path, key.as_ref()) {
                 Ok(result) => results.push(result),
                 Err(error) => {
-                    anstream::eprintln!("left out: {error}");
+                    tell(format_args!("left out: {error}"));
                     left_out = Some(error);
                 }
             }
@@ -188,7 +189,7 @@ impl TableCommand {
                 match self.versus(task, result, key.as_ref(), &results) {
                     Ok(compared) => versus.push(compared),
                     Err(error) => {
-                        anstream::eprintln!("left out: {}: {error}", task.name);
+                        tell(format_args!("left out: {}: {error}", task.name));
                         left_out = Some(error);
                         let result = result.clone();
                         results.retain(|it| !it.is_comparable(&result));

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anstyle::{AnsiColor, Style};
-use chefshat_cli::error::{CommandError, say};
+use chefshat_cli::error::{CommandError, say, tell};
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::case::{CASES, Case, Patience};
 use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
@@ -176,10 +176,10 @@ impl CheckAgent {
             // If nobody reads this, no agent starts, and the case reports that after its time.
             let _unread = say(line);
         } else {
-            anstream::eprintln!(
+            tell(format_args!(
                 "{}: start an agent on {address} with join code {code}",
                 case.name
-            );
+            ));
         }
     }
 

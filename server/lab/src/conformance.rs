@@ -11,7 +11,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
-use chefshat_cli::error::{CommandError, is_broken_pipe};
+use chefshat_cli::error::{CommandError, is_broken_pipe, tell};
 use chefshat_cli::{numbers, progress};
 
 const HELP: &str = "\
@@ -45,7 +45,7 @@ impl Conformance {
                 Ok(false) => code = ExitCode::FAILURE,
                 Err(error) if is_broken_pipe(&error) => return Err(error),
                 Err(error) => {
-                    anstream::eprintln!("chefshat: {error}");
+                    tell(format_args!("chefshat: {error}"));
                     code = ExitCode::FAILURE;
                 }
             }

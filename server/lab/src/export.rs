@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use chefshat_cli::data_dir::RecordsArg;
-use chefshat_cli::error::{CommandError, after_printing};
+use chefshat_cli::error::{CommandError, after_printing, tell};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::progress;
 
@@ -120,9 +120,9 @@ impl Export {
         let mut code = ExitCode::SUCCESS;
         if exported.damaged > 0 && !self.skip_damaged {
             let damaged = counted(exported.damaged, "damaged file");
-            anstream::eprintln!(
+            tell(format_args!(
                 "{damaged} left out in whole or part; with --skip-damaged this is no failure"
-            );
+            ));
             code = ExitCode::FAILURE;
         }
         after_printing(printed, code)
@@ -145,13 +145,17 @@ impl Export {
     /// The report for people.
     fn write_report(&self, out: &mut impl Write, exported: &Exported) -> std::io::Result<()> {
         for record in &exported.skipped {
-            anstream::eprintln!("skipped: {}: {}", record.path.display(), record.problem);
+            tell(format_args!(
+                "skipped: {}: {}",
+                record.path.display(),
+                record.problem
+            ));
         }
         if exported.filtered > 0 {
-            anstream::eprintln!(
+            tell(format_args!(
                 "excluded by the filter: {}",
                 counted(exported.filtered, "game")
-            );
+            ));
         }
         writeln!(
             out,

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use chefshat_cli::data_dir::RecordsArg;
-use chefshat_cli::error::{CommandError, after_printing};
+use chefshat_cli::error::{CommandError, after_printing, tell};
 use chefshat_cli::kind::{KindArg, kind_filter};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line};
@@ -76,7 +76,7 @@ impl RatingsCommand {
         let found = self.records.find()?;
         let mut gathered = self.gather(&found.files)?;
         for missing in found.missing {
-            anstream::eprintln!("chefshat: left out {missing}");
+            tell(format_args!("chefshat: left out {missing}"));
             gathered.damaged += 1;
         }
         let kind = kind_filter(self.kind);
@@ -92,7 +92,9 @@ impl RatingsCommand {
         let mut code = ExitCode::SUCCESS;
         if gathered.damaged > 0 && !self.skip_damaged {
             let damaged = counted(gathered.damaged, "damaged record");
-            anstream::eprintln!("{damaged} left out; with --skip-damaged this is no failure");
+            tell(format_args!(
+                "{damaged} left out; with --skip-damaged this is no failure"
+            ));
             code = ExitCode::FAILURE;
         }
         after_printing(printed, code)
@@ -117,7 +119,10 @@ impl RatingsCommand {
             let record = match record {
                 Ok(record) => record,
                 Err(problem) => {
-                    anstream::eprintln!("chefshat: left out {}: {problem}", path.display());
+                    tell(format_args!(
+                        "chefshat: left out {}: {problem}",
+                        path.display()
+                    ));
                     gathered.damaged += 1;
                     continue;
                 }

@@ -17,7 +17,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayon::prelude::*;
 
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, tell};
 use chefshat_cli::numbers::grouped;
 use chefshat_cli::rules_args::RulesArgs;
 use chefshat_cli::{progress, threads};
@@ -174,9 +174,9 @@ fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
 /// Prints the speed to standard error, because it differs from run to run.
 fn say_speed(table: &BatchTable, seconds: f64) {
     let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
-    eprintln!(
+    tell(format_args!(
         "{} answers of agents in {seconds:.1} s, {:.1} million a second",
         grouped(answers),
         answers as f64 / seconds / 1e6
-    );
+    ));
 }

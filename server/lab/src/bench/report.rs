@@ -1,5 +1,6 @@
 //! Results as text and as JSON.
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use chefshat_benchmark::{BENCHMARK, MeanWithInterval, PairedDifference, TaskResult};
@@ -15,7 +16,7 @@ pub(super) const VERSUS: &str = "greedy";
 pub(super) fn print(result: &TaskResult, as_json: bool) -> Result<ExitCode, CommandError> {
     match as_json {
         true => say(serde_json::to_string(result)?)?,
-        false => anstream::print!("{}", text(result)),
+        false => write!(anstream::stdout().lock(), "{}", text(result))?,
     }
     Ok(match result.is_valid() {
         true => ExitCode::SUCCESS,
@@ -111,7 +112,7 @@ pub(super) fn print_table(
 ) -> Result<(), CommandError> {
     match as_json {
         true => say(table_json(results, versus))?,
-        false => anstream::print!("{}", table_text(results, versus)),
+        false => write!(anstream::stdout().lock(), "{}", table_text(results, versus))?,
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use chefshat_benchmark::{AgentInfo, Task, tasks};
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, tell};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::AgentCommand;
@@ -104,9 +104,9 @@ impl Run {
             Folder::open(&self.out, task.deals_key.as_ref()).map_or(0, |folder| folder.played());
         if played > 0 {
             let games = counted(played as u64, "game");
-            anstream::eprintln!(
+            tell(format_args!(
                 "the records of {games} are kept; the same command plays the others"
-            );
+            ));
         }
     }
 
@@ -170,9 +170,9 @@ impl Run {
         let (played, missing) = (folder.played(), folder.missing(self.deals()?).len());
         if played > 0 {
             let (path, games) = (self.out.display(), counted(played as u64, "game"));
-            anstream::eprintln!(
+            tell(format_args!(
                 "{path} has the records of {games}, {missing} are played now; for a changed agent use another --out"
-            );
+            ));
         }
         Ok(folder)
     }

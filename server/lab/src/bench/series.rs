@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use chefshat_benchmark::{AgentInfo, Task};
-use chefshat_cli::error::CommandError;
+use chefshat_cli::error::{CommandError, tell};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::stops::Stops;
 use chefshat_cli::toml_file;
@@ -109,7 +109,7 @@ impl Series {
             // Returning ends the agents' processes.
             stop = stops.next() => {
                 ending.stopped.store(true, Ordering::Relaxed);
-                anstream::eprintln!("the records are kept; the same command resumes");
+                tell(format_args!("the records are kept; the same command resumes"));
                 ending.closing.close();
                 ending.closing.wait().await;
                 return Ok(stop.exit_code());
@@ -148,9 +148,9 @@ impl Series {
                     going_on.map(|player| missing(player).len() as f64 * player.costs.highest());
                 let next: f64 = next.sum();
                 if next > 0.0 && spent + next > budget {
-                    anstream::eprintln!(
+                    tell(format_args!(
                         "the budget of {budget} ends the series: {spent:.4} is spent, and the next deals may cost {next:.4}"
-                    );
+                    ));
                     return players.iter().all(|player| player.has_all(first));
                 }
             }
@@ -187,7 +187,7 @@ impl Series {
             });
             if let Err(error) = written {
                 failed = true;
-                anstream::eprintln!("{}: {error}", player.name());
+                tell(format_args!("{}: {error}", player.name()));
             }
         }
         if results.is_empty() {
@@ -272,23 +272,26 @@ impl Player {
             Ok(()) => {
                 let games = deals - folder.missing(deals).len();
                 let cost = self.costs.in_words();
-                anstream::eprintln!("{name}: {games} of {}{cost}", counted(deals as u64, "game"));
+                tell(format_args!(
+                    "{name}: {games} of {}{cost}",
+                    counted(deals as u64, "game")
+                ));
                 0
             }
             Err(error) => {
-                anstream::eprintln!("{name}: {error}");
+                tell(format_args!("{name}: {error}"));
                 self.failures + 1
             }
         };
         if self.costs.are_unknown() {
-            anstream::eprintln!(
+            tell(format_args!(
                 "{name} plays no further games: what they cost is unknown. Add --price to its command and give it another name, \
                  or use an endpoint that reports tokens"
-            );
+            ));
             self.has_ended = true;
         }
         if self.failures == hosted::FAILURES {
-            anstream::eprintln!("{name} plays no further games");
+            tell(format_args!("{name} plays no further games"));
             self.has_ended = true;
         }
     }
@@ -301,7 +304,7 @@ impl Player {
             let usage = |deal: usize| match folder.game(deal) {
                 Ok(game) => game.and_then(|game| game.language_model),
                 Err(error) => {
-                    anstream::eprintln!("{error}");
+                    tell(error);
                     None
                 }
             };

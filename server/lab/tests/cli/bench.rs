@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::run::{Ended, chefshat, fixture, serve, typed};
+use super::run::{Ended, chefshat, fixture, serve, typed, typed_into_a_closed_pipe};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_chefshat-lab");
 
@@ -398,4 +398,9 @@ fn rooms_of_an_agent_that_has_exited_are_closed() {
     run("shift", &out, &exits).assert_failed("exit");
     let rooms = typed(&format!("room list --server {url}")).well();
     assert!(!rooms.stdout.contains("waiting"), "{rooms:?}");
+}
+
+#[test]
+fn a_reader_may_close_the_output() {
+    typed_into_a_closed_pipe("bench tasks").clean();
 }
