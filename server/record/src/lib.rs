@@ -23,3 +23,6 @@ pub mod summary;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod words;
+
+/// Most Shifts, or points to play for, of a game on a server of which a record is assembled as a whole.
+pub const MAX_RECORDED_SHIFTS: u32 = 1_000;

@@ -57,7 +57,7 @@ impl Limits {
         memory: u64::MAX,
         seeds: 16_384,
         recorded_games: 256,
-        recorded_shifts: 1_000,
+        recorded_shifts: chefshat_record::MAX_RECORDED_SHIFTS,
         network_multiplications: 1 << 20,
     };
 }

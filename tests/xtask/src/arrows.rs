@@ -95,7 +95,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-tournament",
             "chefshat-record",
             "chefshat-room",
-            "chefshat-vector",
             "chefshat-study",
         ],
     ),
@@ -227,6 +226,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
 /// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its test features,
 /// itself.
 const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[
+    ("chefshat-wire", &["chefshat-vector"]),
     ("chefshat-store", &["chefshat-agents", "chefshat-postgres"]),
     (
         "chefshat-server",

@@ -25,7 +25,7 @@ use super::policy::{policy_from_proto, policy_to_proto, requested_policy};
 use super::room::{display_names_from_proto, fills_from_proto, wizards_from_proto};
 
 /// Most Shifts of a hosted game, and highest target in points.
-pub const MAX_HOSTED_SHIFTS: u32 = chefshat_vector::Limits::OF_SERVER.recorded_shifts;
+pub const MAX_HOSTED_SHIFTS: u32 = chefshat_record::MAX_RECORDED_SHIFTS;
 
 /// How long a participant may be away by default, milliseconds.
 const DEFAULT_DROP_OUT_MS: u64 = 1_800_000;
