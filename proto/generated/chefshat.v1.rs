@@ -10753,9 +10753,9 @@ pub mod study_service_client {
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
         /// traces, and its games with their records, also those that it played with others of its group. What
         /// stays is that a participant with this number took part, when, in which conditions, and that it
-        /// consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
-        /// others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN, STORE_FAILED).
+        /// consented. Unless it had ended already, it counts as withdrawn from then on. Returns when the
+        /// data are deleted; at once, if others still play its game: the data are deleted when that is over.
+        /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         pub async fn delete_study_participant(
             &mut self,
             request: impl tonic::IntoRequest<super::DeleteStudyParticipantRequest>,
@@ -10934,9 +10934,9 @@ pub mod study_service_server {
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
         /// traces, and its games with their records, also those that it played with others of its group. What
         /// stays is that a participant with this number took part, when, in which conditions, and that it
-        /// consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
-        /// others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
-        /// (SHUTTING_DOWN, STORE_FAILED).
+        /// consented. Unless it had ended already, it counts as withdrawn from then on. Returns when the
+        /// data are deleted; at once, if others still play its game: the data are deleted when that is over.
+        /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         fn delete_study_participant(
             &self,
             request: tonic::Request<super::DeleteStudyParticipantRequest>,

@@ -86,9 +86,9 @@ class StudyServiceStub:
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
     traces, and its games with their records, also those that it played with others of its group. What
     stays is that a participant with this number took part, when, in which conditions, and that it
-    consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
-    others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED).
+    consented. Unless it had ended already, it counts as withdrawn from then on. Returns when the
+    data are deleted; at once, if others still play its game: the data are deleted when that is over.
+    NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]
     """Deletes a study with all its data: settings, participants, answers, interface traces, and games
@@ -155,9 +155,9 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
     traces, and its games with their records, also those that it played with others of its group. What
     stays is that a participant with this number took part, when, in which conditions, and that it
-    consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
-    others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED).
+    consented. Unless it had ended already, it counts as withdrawn from then on. Returns when the
+    data are deleted; at once, if others still play its game: the data are deleted when that is over.
+    NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]  # type: ignore[assignment]
     """Deletes a study with all its data: settings, participants, answers, interface traces, and games
@@ -281,9 +281,9 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
         traces, and its games with their records, also those that it played with others of its group. What
         stays is that a participant with this number took part, when, in which conditions, and that it
-        consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
-        others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED).
+        consented. Unless it had ended already, it counts as withdrawn from then on. Returns when the
+        data are deleted; at once, if others still play its game: the data are deleted when that is over.
+        NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
