@@ -42,6 +42,7 @@ use crate::config::{
 };
 use crate::connections::{self, Client, Connection, Connections, Limits, Listener};
 use crate::forwarded::note_clients;
+use crate::front::InFront;
 use crate::grpc;
 use crate::handshakes::Handshakes;
 use crate::limits::frames::MAX_HEADER_BYTES;
@@ -496,7 +497,7 @@ impl Server {
                 config.painter.clone(),
             )?)
             .layer(tonic_web::GrpcWebLayer::new())
-            .layer(grpc::HeartbeatLayer)
+            .layer(InFront(grpc::HeartbeatLayer))
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))
             .layer(grpc::AccessLayer::new(

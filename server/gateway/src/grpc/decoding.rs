@@ -18,10 +18,11 @@ use http_body::Frame;
 use tokio::time::{Instant, Sleep, sleep_until};
 use tonic::body::Body;
 use tonic::{Code, Status};
-use tower::{Layer, Service};
+use tower::Service;
 
 use super::limits::charged;
 use super::status::{Refusal, is_elsewhere, status};
+use crate::front::{Front, InFront};
 use chefshat_admission::access::{Call, MessageLimits};
 use chefshat_admission::limits::{
     CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MAX_FREE_DECODED, MESSAGE_TIMEOUT, Permit,
@@ -106,49 +107,25 @@ pub struct DecodingLayer {
 
 impl DecodingLayer {
     /// Creates a layer that takes memory from `limits`.
-    pub fn new(limits: Arc<CallLimits>) -> Self {
-        Self { limits }
+    pub fn new(limits: Arc<CallLimits>) -> InFront<Self> {
+        InFront(Self { limits })
     }
-}
-
-impl<S> Layer<S> for DecodingLayer {
-    type Service = WithDecoding<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithDecoding {
-            limits: Arc::clone(&self.limits),
-            services,
-        }
-    }
-}
-
-/// The services with the costs of messages in front of them.
-#[derive(Debug, Clone)]
-pub struct WithDecoding<S> {
-    limits: Arc<CallLimits>,
-    services: S,
 }
 
 /// The permit of the message that a call decodes or executes.
 type HeldPermit = Arc<Mutex<Option<Permit>>>;
 
-impl<S> Service<Request<Body>> for WithDecoding<S>
+impl<S> Front<S, Body> for DecodingLayer
 where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+    type Answering = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<Body>) -> Self::Future {
+    fn answer(&self, services: &mut S, request: Request<Body>) -> Self::Answering {
         let Some(call) = Call::find(request.uri().path()) else {
-            return Either::Left(self.services.call(request));
+            return Either::Left(services.call(request));
         };
         let permit = HeldPermit::default();
         let messages = Messages {
@@ -163,8 +140,7 @@ where
             begun: 0,
             until: None,
         };
-        let answering =
-            (self.services).call(request.map(|body| Body::new(Costed { body, messages })));
+        let answering = services.call(request.map(|body| Body::new(Costed { body, messages })));
         if call.sends_many {
             return Either::Left(answering);
         }
@@ -532,7 +508,7 @@ mod tests {
     use http_body_util::{BodyExt as _, StreamBody};
     use prost::Message as _;
     use tonic_types::StatusExt as _;
-    use tower::service_fn;
+    use tower::{Layer as _, service_fn};
 
     use super::*;
     use chefshat_admission::access::CALLS;

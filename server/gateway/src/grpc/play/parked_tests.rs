@@ -302,7 +302,8 @@ async fn stream_of_gateway(node: &Node, directory: &Arc<Says>) -> Stream {
         .peers(&Arc::default());
     let limits = Arc::new(CallLimits::new(Shares::default()));
     let known: Arc<dyn Directory> = Arc::clone(directory) as _;
-    let gateway = ForwardLayer::new(known, peers, limits).gateway(&http::Request::new(()));
+    let layer = ForwardLayer::new(known, peers, limits).0;
+    let gateway = layer.gateway(&http::Request::new(()));
     let Stream { reader, updates } = node.stream();
     let reader = reader.with_remote(Some(gateway));
     Stream { reader, updates }
