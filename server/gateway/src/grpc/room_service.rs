@@ -21,7 +21,8 @@ use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    self, Refusal, field, name_fingerprint, request_id, room_failed, room_gone, ticket_unknown,
+    self, Refusal, field, name_fingerprint, not_created, request_id, room_failed, room_gone,
+    ticket_unknown,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
@@ -255,7 +256,7 @@ impl RoomService for RoomCalls {
                 .check_not_created_elsewhere(request, key)
                 .await?;
         }
-        let created = created.map_err(Refusal::from)?;
+        let created = created.map_err(|error| not_created(error, |never| match never {}))?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
             room: Some(room),

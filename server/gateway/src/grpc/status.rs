@@ -16,7 +16,6 @@ use tonic_types::{ErrorDetails, StatusExt as _};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{NotStored, Refused};
 use chefshat_hosting::cluster::Elsewhere;
-use chefshat_hosting::journaled::CreateProblem;
 use chefshat_hosting::room::{ReportRefusal, RoomError, RoomGone, SpectateError};
 use chefshat_hosting::rooms::CreateError;
 use chefshat_room::ids::request_id_of;
@@ -499,43 +498,27 @@ impl From<MarkError> for Refusal {
     }
 }
 
-impl From<CreateError> for Refusal {
-    fn from(error: CreateError) -> Self {
-        Self(match error {
-            CreateError::TooMany(limit) => status(
-                Code::ResourceExhausted,
-                "TOO_MANY_ROOMS",
-                error.to_string(),
-                [("max_rooms", &limit.to_string())],
-            ),
-            CreateError::Refused(refused) => return refused.into(),
-            CreateError::RequestIdUsed => request_id_used(&error.to_string()),
-            CreateError::ShuttingDown => shutting_down(),
-            CreateError::NotReached => node_not_reached(&error.to_string()),
-            CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
-            CreateError::Store(error) => {
-                tracing::error!(%error, "creating a room failed");
-                store_failed()
-            }
-        })
-    }
-}
-
-/// A tournament or study was not created. `settings`: the status for a setting that is refused.
+/// A room, tournament or study was not created. `settings`: the status for a setting that is refused.
 pub fn not_created<P: std::error::Error>(
-    problem: CreateProblem<P>,
+    error: CreateError<P>,
     settings: impl FnOnce(P) -> Status,
 ) -> Status {
-    let message = problem.to_string();
-    match problem {
-        CreateProblem::Settings(problem) => settings(problem),
-        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
-        CreateProblem::RequestIdUsed(_) => request_id_used(&message),
-        CreateProblem::ShuttingDown(_) => shutting_down(),
-        CreateProblem::NotReached(_) => node_not_reached(&message),
-        CreateProblem::DiskNearlyFull => disk_nearly_full(&message),
-        CreateProblem::Store(error) => {
-            tracing::error!(%error, "creating a tournament or study failed");
+    let message = error.to_string();
+    match error {
+        CreateError::Settings(problem) => settings(problem),
+        CreateError::TooMany(limit) => status(
+            Code::ResourceExhausted,
+            "TOO_MANY_ROOMS",
+            message,
+            [("max_rooms", &limit.to_string())],
+        ),
+        CreateError::Refused(refused) => Refusal::from(refused).into(),
+        CreateError::RequestIdUsed => request_id_used(&message),
+        CreateError::ShuttingDown => shutting_down(),
+        CreateError::NotReached => node_not_reached(&message),
+        CreateError::DiskNearlyFull => disk_nearly_full(&message),
+        CreateError::Store(error) => {
+            tracing::error!(%error, "creating a room, tournament or study failed");
             store_failed()
         }
     }

@@ -38,7 +38,7 @@ use chefshat_hosting::config::{
 };
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
-    CreateProblem, ExportError, ExportedFile, NotDeleted, NotDone, Studies, StudyHandle,
+    CreateError, ExportError, ExportedFile, NotDeleted, NotDone, Studies, StudyHandle,
 };
 use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
@@ -169,7 +169,7 @@ impl StudyService for StudyCalls {
         }
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.studies.create(settings, request_key, key).await;
-        if let (Err(CreateProblem::Store(StoreError::Taken(_))), Some(request)) =
+        if let (Err(CreateError::Store(StoreError::Taken(_))), Some(request)) =
             (&created, request_key)
         {
             // Another node has created it meanwhile.

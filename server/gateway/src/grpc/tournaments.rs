@@ -34,7 +34,7 @@ use chefshat_hosting::config::{
     MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
 };
 use chefshat_hosting::tournaments::{
-    BeginRefusal, ByHand, ByHandRefusal, CreateProblem, Entry, JoinRefusal, Leaderboard, Newcomer,
+    BeginRefusal, ByHand, ByHandRefusal, CreateError, Entry, JoinRefusal, Leaderboard, Newcomer,
     Stopped, TableProblem, TournamentHandle, Tournaments, Who,
 };
 use chefshat_room::ids::{
@@ -269,7 +269,7 @@ impl TournamentService for TournamentCalls {
             .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.tournaments.create(&name, plan, request_key, key).await;
-        if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
+        if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
             lookup.check_not_created_elsewhere(request_key, key).await?;
         }

@@ -10,41 +10,15 @@ use super::actor::{self, Stop};
 use super::table::Table;
 use super::unit::{Handle, Journaled, New, Unit, UnitHeader as _};
 use crate::cluster::UnitEvent;
-use crate::rooms::Rooms;
-use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
+use crate::rooms::{CreateError, Rooms};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit};
 use chefshat_base::tasks::{named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, UnitId, normal_code};
-use chefshat_store::units::{StoredKind as _, StoredUnit, UnitKind, UnitRow, UnitWrite};
+use chefshat_store::units::{StoredKind as _, StoredUnit, UnitRow, UnitWrite};
 use chefshat_store::{StoreError, units_of};
 
-/// Why a unit was not created. `P`: why its settings are refused.
-#[derive(Debug, thiserror::Error)]
-pub enum CreateProblem<P: std::error::Error> {
-    /// A setting is invalid.
-    #[error(transparent)]
-    Settings(P),
-    /// Its creator, or the server, has too many.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-    /// The request id was used for another unit of this kind.
-    #[error("this request id was used to create another {0}; draw a new one")]
-    RequestIdUsed(UnitKind),
-    /// The server is shutting down.
-    #[error("the server is shutting down and accepts no new {}", .0.plural())]
-    ShuttingDown(UnitKind),
-    /// No other node reaches this one.
-    #[error("no other node reaches this one, which accepts no new {}; try again, and if it fails again, tell the operator", .0.plural())]
-    NotReached(UnitKind),
-    /// The disk has no space for more games.
-    #[error("the server's disk is nearly full; the rest is reserved for running games")]
-    DiskNearlyFull,
-    /// The store failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-}
-
 /// Why a unit of this kind was not created.
-type Problem<U> = CreateProblem<<U as Journaled>::SettingsProblem>;
+type Problem<U> = CreateError<<U as Journaled>::SettingsProblem>;
 
 /// The owner token of what a request creates: repetitions have the same.
 pub(crate) fn owner_of<T>(request: Option<RequestKey>) -> Token<T> {
@@ -95,14 +69,14 @@ impl<U: Journaled> Registry<U> {
     /// They are not.
     fn check_accepting(&self) -> Result<(), Problem<U>> {
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
-            return Err(CreateProblem::ShuttingDown(U::KIND));
+            return Err(CreateError::ShuttingDown);
         }
         if !self.rooms.is_reached() {
-            return Err(CreateProblem::NotReached(U::KIND));
+            return Err(CreateError::NotReached);
         }
         match self.rooms.store().has_space() {
             true => Ok(()),
-            false => Err(CreateProblem::DiskNearlyFull),
+            false => Err(CreateError::DiskNearlyFull),
         }
     }
 
@@ -124,7 +98,7 @@ impl<U: Journaled> Registry<U> {
             if let Some(handle) = self.get(owner.subject) {
                 return match handle.is_owner(&owner.to_text()) {
                     true => Ok(handle),
-                    false => Err(CreateProblem::RequestIdUsed(U::KIND)),
+                    false => Err(CreateError::RequestIdUsed),
                 };
             }
             match Reservation::of(self, owner.subject.unit(), charged)? {

@@ -610,7 +610,7 @@ async fn studies_count_after_a_restart_too() {
     assert_eq!(deleted, Ok((2, 0)));
     let refused = studies.create(settings(), None, Key::Local).await;
     assert!(
-        matches!(refused, Err(CreateProblem::Refused(_))),
+        matches!(refused, Err(CreateError::Refused(_))),
         "still full"
     );
 }
@@ -1163,7 +1163,7 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     };
     // A tenth of 48 MiB.
     assert_eq!(created.len(), 5);
-    let CreateProblem::Refused(refused) = refused else {
+    let CreateError::Refused(refused) = refused else {
         panic!("{refused}");
     };
     assert_eq!(refused.reason, "TOO_MANY_STUDIES");
@@ -1178,7 +1178,7 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     deleting.expect("nobody is in it");
     tokio::task::yield_now().await;
     create().await.expect("its memory is free again");
-    assert!(matches!(create().await, Err(CreateProblem::Refused(_))));
+    assert!(matches!(create().await, Err(CreateError::Refused(_))));
 }
 
 /// One participant, who answers questionnaires with long texts and nothing else.
