@@ -255,6 +255,12 @@ impl<F: Fn() -> Status + Unpin> HttpBody for EndingBody<F> {
     }
 }
 
+/// The caller of a request, and its message.
+pub(super) fn opened<M>(request: tonic::Request<M>) -> (Caller, M) {
+    let caller = Caller::of(request.extensions());
+    (caller, request.into_inner())
+}
+
 /// Checks that the scope of a caller includes something.
 pub(super) fn check(caller: &Caller, reaches: impl FnOnce(&Caller) -> bool) -> Result<(), Status> {
     match caller.scope {

@@ -7,7 +7,6 @@ use chefshat_proto::v1::{
     self, admin_service_client::AdminServiceClient, admin_service_server::AdminService,
     study_service_client::StudyServiceClient,
 };
-use chefshat_record::convert::FieldProblem;
 use chefshat_record::pseudonym::{Named, Pseudonym, is_fingerprint};
 use futures::future::join_all;
 use tokio::sync::mpsc;
@@ -23,7 +22,7 @@ use super::limits::charged;
 use super::lookup::Lookup;
 use super::pages;
 use super::status::{
-    Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
+    Refusal, invalid, owner_unreachable, room_unknown, shutting_down, status, store_failed,
     tournament_unknown,
 };
 use super::tournaments;
@@ -178,8 +177,8 @@ impl AdminService for AdminCalls {
             newest: Some(request.keep).filter(|count| *count > 0),
         };
         if keep == Keep::default() {
-            let problem = FieldProblem::new("keep", "set ended_before_ms, keep or both");
-            return Err(field("PRUNE_REFUSED", &problem));
+            let problem = "set ended_before_ms, keep or both";
+            return Err(invalid("PRUNE_REFUSED", "keep", problem));
         }
         let pruned = self.retention.prune(keep).await.map_err(failed)?;
         Ok(Response::new(v1::PruneRecordsResponse {
@@ -376,7 +375,7 @@ impl StudiesElsewhere for OtherNodes {
 
 /// A participant's name from a request. Empty seats have an empty one.
 fn given(name: String, fingerprint: Option<String>) -> Result<Named, Status> {
-    let refused = |name, what| Err(field("NAME_REFUSED", &FieldProblem::new(name, what)));
+    let refused = |name, what| Err(invalid("NAME_REFUSED", name, what));
     if name.is_empty() {
         return refused("name", "give the exact name the participant played under");
     }

@@ -1,9 +1,8 @@
 //! Paging of lists: page sizes and tokens.
 
-use chefshat_record::convert::FieldProblem;
 use tonic::Status;
 
-use super::status::field;
+use super::status::invalid;
 
 /// Default page size.
 const DEFAULT_PAGE_SIZE: u32 = 50;
@@ -29,6 +28,6 @@ pub(super) fn last_shown(page_token: &str) -> Result<Option<u64>, Status> {
 
 /// A page token is not one of this server.
 pub(super) fn token_refused() -> Status {
-    let problem = FieldProblem::new("page_token", "not a token of this server");
-    field("PAGE_TOKEN_REFUSED", &problem)
+    let problem = "not a token of this server";
+    invalid("PAGE_TOKEN_REFUSED", "page_token", problem)
 }

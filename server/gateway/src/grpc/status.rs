@@ -13,12 +13,10 @@ use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{NotStored, Refused};
 use chefshat_hosting::cluster::Elsewhere;
 use chefshat_hosting::room::{ReportRefusal, RoomError, RoomGone, SpectateError};
 use chefshat_hosting::rooms::CreateError;
-use chefshat_room::ids::request_id_of;
 use chefshat_room::{
     ExpressError, HintError, JoinError, LeaveError, MARKERS_AT_ONCE, MAX_MARKERS, MarkError,
     ReportError,
@@ -118,6 +116,11 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
     )
 }
 
+/// The status for an invalid field, and what is wrong with it.
+pub fn invalid(reason: &str, name: &'static str, problem: impl Into<String>) -> Status {
+    field(reason, &FieldProblem::new(name, problem))
+}
+
 /// Reason of the error while the server that has what a call is about cannot be reached.
 pub(super) const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
 
@@ -188,38 +191,6 @@ pub fn table_unknown() -> Status {
         "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament",
         [("field", "table_ticket")],
     )
-}
-
-/// The id of a request, if set, as it counts for its caller: the answer to a repeated request
-/// contains secrets, and another token does not get them. Callers without a token are not told apart
-/// by their addresses, because a client that repeats a request may have another one by then.
-pub fn request_id(bytes: &[u8], caller: &Caller) -> Result<Option<[u8; 32]>, Status> {
-    if bytes.is_empty() {
-        return Ok(None);
-    }
-    let id = bytes.try_into().map_err(|_| {
-        let message = format!("{} bytes; give 32 random ones, or none", bytes.len());
-        field(
-            "REQUEST_ID_REFUSED",
-            &FieldProblem::new("request_id", message),
-        )
-    })?;
-    Ok(Some(match &caller.token_hash {
-        Some(token) => request_id_of(id, token),
-        None => *id,
-    }))
-}
-
-/// The fingerprint of a name and its key; empty without a key.
-pub fn name_fingerprint(name: &str, key: &[u8]) -> Result<String, Status> {
-    if key.is_empty() {
-        return Ok(String::new());
-    }
-    let key = key.try_into().map_err(|_| {
-        let message = format!("{} bytes; give 32 random ones, or none", key.len());
-        field("NAME_KEY_REFUSED", &FieldProblem::new("name_key", message))
-    })?;
-    Ok(convert::name_fingerprint(name, key))
 }
 
 /// A request id was reused with other content.
@@ -352,6 +323,11 @@ pub fn is_not_owner(headers: &http::HeaderMap) -> bool {
 /// call is about.
 pub fn is_refusal(status: &Status) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason != NOT_OWNER)
+}
+
+/// A message sets no command.
+pub fn command_missing() -> Status {
+    invalid("COMMAND_MISSING", "command", "set a command")
 }
 
 /// The status for an error of a room; `unknown`: if it does not know the secret.
@@ -490,10 +466,7 @@ impl From<MarkError> for Refusal {
             }
             MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
             MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
-            MarkError::Future => field(
-                MARKER_REFUSED,
-                &FieldProblem::new("elapsed_us", error.to_string()),
-            ),
+            MarkError::Future => invalid(MARKER_REFUSED, "elapsed_us", error.to_string()),
         })
     }
 }
@@ -537,8 +510,8 @@ impl From<ReportRefusal> for Refusal {
             ReportError::Refused(unjudged) => match unjudged {
                 TableRefusal::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
                 TableRefusal::ReservedQuestionId => {
-                    let problem = FieldProblem::new("question.question_id", error.to_string());
-                    return Self(field("REPORT_REFUSED", &problem));
+                    let name = "question.question_id";
+                    return Self(invalid("REPORT_REFUSED", name, error.to_string()));
                 }
                 TableRefusal::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
                 TableRefusal::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
