@@ -11,6 +11,8 @@ mod participants;
 mod reader;
 mod remote;
 mod requests;
+#[cfg(test)]
+mod testing;
 mod waiting;
 
 use std::future::poll_fn;
