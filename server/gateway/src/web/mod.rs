@@ -21,7 +21,7 @@ use tonic::body::Body;
 use tower::{BoxError, Service};
 
 use answer::{DOCUMENT, absent, answer, busy, generated, health};
-use calls::is_serving;
+use calls::{Services, is_serving};
 use files::find;
 pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
@@ -100,11 +100,7 @@ fn with_body(answer: Response<Bytes>) -> Response<Body> {
 
 impl PageLayer {
     /// The answer to a request for the page.
-    async fn page<S>(&self, request: Request<()>, services: S) -> Response<Bytes>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    async fn page(&self, request: Request<()>, services: impl Services) -> Response<Bytes> {
         let path = request.uri().path();
         match Link::of(path) {
             None if path == HEALTH => health(
@@ -117,11 +113,12 @@ impl PageLayer {
     }
 
     /// The answer to a request for the replay of a game or its picture.
-    async fn previewed<S>(&self, link: Link, services: S, request: &Request<()>) -> Response<Bytes>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    async fn previewed(
+        &self,
+        link: Link,
+        services: impl Services,
+        request: &Request<()>,
+    ) -> Response<Bytes> {
         let (previews, extensions) = (&self.previews, request.extensions());
         match link {
             Link::Picture(game) => match previews.picture(game, services, extensions).await {
