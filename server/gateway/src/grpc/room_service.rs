@@ -17,7 +17,7 @@ use super::access::opened;
 use super::fields::{checked_kind, checked_name, name_fingerprint, request_id};
 use super::forward::Gateway;
 use super::limits::make_way;
-use super::lists::{self, Listing, Page, Part};
+use super::lists::{self, Listing, Part};
 use super::lookup::Lookup;
 use super::new_room::new_room;
 use super::pages;
@@ -186,17 +186,14 @@ impl Listing for RoomList<'_> {
         service.list_rooms(gateway.request(request)).await
     }
 
-    fn page(response: v1::ListRoomsResponse) -> Page<v1::Room> {
-        Page {
-            entries: response.rooms,
-            next_page_token: response.next_page_token,
-        }
+    fn page(response: v1::ListRoomsResponse) -> (Vec<v1::Room>, String) {
+        (response.rooms, response.next_page_token)
     }
 
-    fn response(page: Page<v1::Room>) -> v1::ListRoomsResponse {
+    fn response(rooms: Vec<v1::Room>, next_page_token: String) -> v1::ListRoomsResponse {
         v1::ListRoomsResponse {
-            rooms: page.entries,
-            next_page_token: page.next_page_token,
+            rooms,
+            next_page_token,
         }
     }
 

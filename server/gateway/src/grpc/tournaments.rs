@@ -19,7 +19,7 @@ use super::fields::{checked_kind, checked_name, name_fingerprint, request_id};
 use super::follow::{self, Responses, compute_failed, follow};
 use super::forward::Gateway;
 use super::limits::make_way;
-use super::lists::{self, Listing, Page, Part};
+use super::lists::{self, Listing, Part};
 use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
@@ -207,17 +207,17 @@ impl Listing for TournamentList<'_> {
         service.list_tournaments(gateway.request(request)).await
     }
 
-    fn page(response: v1::ListTournamentsResponse) -> Page<v1::Tournament> {
-        Page {
-            entries: response.tournaments,
-            next_page_token: response.next_page_token,
-        }
+    fn page(response: v1::ListTournamentsResponse) -> (Vec<v1::Tournament>, String) {
+        (response.tournaments, response.next_page_token)
     }
 
-    fn response(page: Page<v1::Tournament>) -> v1::ListTournamentsResponse {
+    fn response(
+        tournaments: Vec<v1::Tournament>,
+        next_page_token: String,
+    ) -> v1::ListTournamentsResponse {
         v1::ListTournamentsResponse {
-            tournaments: page.entries,
-            next_page_token: page.next_page_token,
+            tournaments,
+            next_page_token,
         }
     }
 
