@@ -83,11 +83,7 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::ListClientsResponse>, Status> {
         let request = request.into_inner();
         let after = pages::last_shown(&request.page_token)?.unwrap_or_default();
-        let size = match request.page_size {
-            0 => CLIENTS_PER_PAGE,
-            size => size.min(CLIENTS_PER_PAGE),
-        };
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let size = pages::size_within(request.page_size, CLIENTS_PER_PAGE, CLIENTS_PER_PAGE);
         let clients = self.connections.clients();
         let mut later = clients.iter().filter(|client| client.id > after);
         let page: Vec<_> = later.by_ref().take(size).collect();

@@ -11,10 +11,12 @@ const MAX_PAGE_SIZE: u32 = 100;
 
 /// The page size of a request.
 pub(super) fn page_size(asked: u32) -> usize {
-    let size = match asked {
-        0 => DEFAULT_PAGE_SIZE,
-        size => size.min(MAX_PAGE_SIZE),
-    };
+    size_within(asked, DEFAULT_PAGE_SIZE, MAX_PAGE_SIZE)
+}
+
+/// The number of entries of a request: `default` if it asks for none, and at most `most`.
+pub(super) fn size_within(asked: u32, default: u32, most: u32) -> usize {
+    let size = if asked == 0 { default } else { asked.min(most) };
     usize::try_from(size).unwrap_or(usize::MAX)
 }
 

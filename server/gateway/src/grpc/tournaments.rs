@@ -558,11 +558,7 @@ impl TournamentService for TournamentCalls {
         let handle = self.find(&caller, &request.tournament_id).await?;
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
-        let size = match request.page_size {
-            0 => DEFAULT_LINES,
-            size => size.min(MAX_GAMES_PAGE),
-        };
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let size = pages::size_within(request.page_size, DEFAULT_LINES, MAX_GAMES_PAGE);
         let mut games = handle.games(from, size + 1);
         let more = games.len() > size;
         games.truncate(size);
@@ -583,16 +579,13 @@ impl TournamentService for TournamentCalls {
         make_way(request.extensions());
         let request = request.into_inner();
         checked_kind(request.kind)?;
-        let limit = match request.limit {
-            0 => DEFAULT_LINES,
-            limit => limit.min(MAX_LEADERBOARD_LINES),
-        };
+        let limit = pages::size_within(request.limit, DEFAULT_LINES, MAX_LEADERBOARD_LINES);
         let ratings = self.leaderboard.ratings().await.map_err(compute_failed)?;
         Ok(Response::new(convert::leaderboard(
             &ratings,
             request.kind(),
             request.min_games,
-            usize::try_from(limit).unwrap_or(usize::MAX),
+            limit,
         )))
     }
 }
