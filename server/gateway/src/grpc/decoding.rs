@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 use std::pin::Pin;
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock};
 use std::task::{Context, Poll, ready};
 
 use axum::body::HttpBody;
@@ -28,6 +28,7 @@ use chefshat_admission::limits::{
     CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MAX_FREE_DECODED, MESSAGE_TIMEOUT, Permit,
     Refused, SMALL_DECODED, SMALL_MESSAGE,
 };
+use chefshat_base::lock::Lock;
 use chefshat_wire::encoded::peer;
 
 /// Bytes before each message: a flag and its length.
@@ -113,7 +114,7 @@ impl DecodingLayer {
 }
 
 /// The permit of the message that a call decodes or executes.
-type HeldPermit = Arc<Mutex<Option<Permit>>>;
+type HeldPermit = Arc<Lock<Option<Permit>>>;
 
 impl<S> Front<S, Body> for DecodingLayer
 where
@@ -168,7 +169,7 @@ fn memory_of(limits: &CallLimits, plays: bool) -> &Decoding {
 }
 
 fn take(permit: &HeldPermit) -> Option<Permit> {
-    (permit.lock().expect("nothing panics under this lock")).take()
+    permit.lock().take()
 }
 
 /// The body of a request, whose messages are costed one by one. Each leaves it whole.
@@ -281,7 +282,7 @@ impl Messages {
                     let held = ready!(permit.as_mut().poll(context));
                     let held = held.map_err(|refused| Status::from(Refusal::from(refused)))?;
                     let message = std::mem::take(message);
-                    *self.permit.lock().expect("nothing panics under this lock") = Some(held);
+                    *self.permit.lock() = Some(held);
                     self.state = State::Next;
                     return Poll::Ready(Ok(Step::Pass(message)));
                 }

@@ -7,7 +7,7 @@
 //! The other node decides about access and charges the caller, so the headers that it needs for
 //! that pass with the request. It never passes the request on.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -34,6 +34,7 @@ use crate::front::{Front, InFront, take_ready};
 use crate::peers::Peers;
 use chefshat_admission::access::{Call, MAX_STUDY_MESSAGE_BYTES, SECRET_HEADER};
 use chefshat_admission::limits::{CallLimits, Key};
+use chefshat_base::lock::Lock;
 use chefshat_base::proxies::FORWARDED_FOR;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::cluster::{Directory, Elsewhere, Peer};
@@ -291,7 +292,7 @@ fn returned(answer: Response<Body>) -> Response<Body> {
 
 /// What has been read of the body of a request, which may be sent again.
 #[derive(Default)]
-struct Kept(Mutex<Read>);
+struct Kept(Lock<Read>);
 
 #[derive(Default)]
 struct Read {
@@ -301,7 +302,7 @@ struct Read {
 
 impl Kept {
     fn add(&self, data: &Bytes) {
-        let mut read = (self.0.lock()).expect("nothing panics under this lock");
+        let mut read = self.0.lock();
         if read.bytes.len() + data.len() > MAX_KEPT_BYTES {
             read.too_long = true;
             read.bytes = Vec::new();
@@ -312,7 +313,7 @@ impl Kept {
 
     /// The message of the request, which has been read; `None` if it is too long.
     fn message(&self) -> Option<Bytes> {
-        let read = (self.0.lock()).expect("nothing panics under this lock");
+        let read = self.0.lock();
         (!read.too_long).then(|| Bytes::copy_from_slice(&read.bytes))
     }
 }

@@ -1,6 +1,6 @@
 //! All units of a kind on this server: creates each once, finds, stops and forgets them.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use tokio::sync::Notify;
 use tokio_util::task::TaskTracker;
@@ -12,6 +12,7 @@ use super::unit::{Handle, Journaled, New, Unit, UnitHeader as _};
 use crate::cluster::UnitEvent;
 use crate::rooms::{CreateError, Rooms};
 use chefshat_admission::limits::{FairSemaphore, Key, Permit};
+use chefshat_base::lock::Lock;
 use chefshat_base::tasks::{named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, UnitId, normal_code};
 use chefshat_store::units::{StoredKind as _, StoredUnit, UnitRow, UnitWrite};
@@ -31,7 +32,7 @@ pub struct Registry<U: Journaled> {
     pub(crate) tracker: TaskTracker,
     pub(crate) common: U::Common,
     stop: Stop,
-    table: Mutex<Table<U>>,
+    table: Lock<Table<U>>,
     /// Notified when the creation of a unit has ended.
     created: Notify,
     places: Arc<FairSemaphore>,
@@ -52,7 +53,7 @@ impl<U: Journaled> Registry<U> {
             tracker,
             common,
             stop: Stop::default(),
-            table: Mutex::default(),
+            table: Lock::default(),
             created: Notify::new(),
             places,
         })
@@ -208,7 +209,7 @@ impl<U: Journaled> Registry<U> {
         let rows = new.folded.rows;
         let (handle, inbox) = Handle::new(new, charged, stop.end.clone());
         U::enter(&handle, &self.rooms);
-        self.lock().enter(Arc::clone(&handle));
+        self.table.lock().enter(Arc::clone(&handle));
         if !handle.is_over() {
             let unit = Unit::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
             let running = actor::run(U::new(unit, &self.common), inbox, stop);
@@ -219,7 +220,7 @@ impl<U: Journaled> Registry<U> {
 
     /// Whether this unit runs here, or is being created.
     pub(crate) fn runs(&self, unit: UnitId) -> bool {
-        let table = self.lock();
+        let table = self.table.lock();
         let running = |handle: &Arc<Handle<U>>| !handle.is_stopped();
         table.get(unit).is_some_and(running) || table.is_in_creation(unit)
     }
@@ -235,7 +236,7 @@ impl<U: Journaled> Registry<U> {
     pub async fn stop_one(&self, unit: UnitId) {
         loop {
             let created = self.created.notified();
-            if !self.lock().is_in_creation(unit) {
+            if !self.table.lock().is_in_creation(unit) {
                 break;
             }
             created.await;
@@ -252,7 +253,7 @@ impl<U: Journaled> Registry<U> {
 
     /// Removes a unit from memory.
     pub(crate) fn forget_one(&self, id: Id<U::Kind>) {
-        self.lock().remove_id(id.unit());
+        self.table.lock().remove_id(id.unit());
     }
 
     /// Stops beginning and counting games; those that end from here on count when the server is
@@ -273,23 +274,19 @@ impl<U: Journaled> Registry<U> {
 
     /// The unit with this id, if it is of this kind.
     pub fn by_unit(&self, unit: UnitId) -> Option<Arc<Handle<U>>> {
-        self.lock().get(unit).cloned()
+        self.table.lock().get(unit).cloned()
     }
 
     /// The unit with this join code.
     pub fn by_code(&self, code: &str) -> Option<Arc<Handle<U>>> {
-        self.lock().by_code(&normal_code(code)).cloned()
+        self.table.lock().by_code(&normal_code(code)).cloned()
     }
 
     /// The units created before number `before`, or all; with their numbers, newest first.
     pub fn earlier(&self, before: Option<u64>) -> Vec<(u64, Arc<Handle<U>>)> {
-        (self.lock().earlier(before))
+        (self.table.lock().earlier(before))
             .map(|(number, handle)| (number, Arc::clone(handle)))
             .collect()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Table<U>> {
-        (self.table.lock()).expect("no code that holds this lock can panic")
     }
 }
 
@@ -311,7 +308,7 @@ impl<U: Journaled> Reservation<U> {
         charged: Key,
     ) -> Result<Option<Self>, Problem<U>> {
         let accepting = registry.check_accepting();
-        let mut table = registry.lock();
+        let mut table = registry.table.lock();
         if table.is_in_creation(id) || table.get(id).is_some() {
             return Ok(None);
         }
@@ -340,7 +337,7 @@ impl<U: Journaled> Reservation<U> {
 
 impl<U: Journaled> Drop for Reservation<U> {
     fn drop(&mut self) {
-        self.registry.lock().release(self.id);
+        self.registry.table.lock().release(self.id);
         self.registry.created.notify_waiters();
     }
 }

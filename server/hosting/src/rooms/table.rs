@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::convert::Infallible;
 use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, MutexGuard};
 
 use tokio::sync::Notify;
 
 use crate::room::{GameEnd, Handle};
 use chefshat_admission::limits::{Permit, Refused};
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::{GameId, RoomId, UnitId};
 use chefshat_room::journal::GameHeader;
 use chefshat_store::StoreError;
@@ -71,11 +72,8 @@ pub(super) struct Table {
 pub(super) struct LockedTable<'a>(Option<MutexGuard<'a, Table>>);
 
 impl<'a> LockedTable<'a> {
-    pub(super) fn new(table: &'a Mutex<Table>) -> Self {
-        let locked = table.lock();
-        Self(Some(
-            locked.expect("no code that holds this lock can panic"),
-        ))
+    pub(super) fn new(table: &'a Lock<Table>) -> Self {
+        Self(Some(table.lock()))
     }
 }
 
