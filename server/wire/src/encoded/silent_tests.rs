@@ -17,6 +17,7 @@ use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, with_jokers_a
 use chefshat_room::{ConnectionId, Core};
 use prost::Message as _;
 
+use super::hidden_tests::sent_since;
 use crate::convert;
 
 /// How many pairs are played, unless `CHEFSHAT_PAIRS` says another number.
@@ -148,18 +149,11 @@ impl World {
     /// Everything sent to a viewer since the last comparison, with its time.
     fn sent_to(&self, see: Viewer, leak: Leak) -> Vec<Vec<u8>> {
         let core = &self.table.core;
-        let mut messages: Vec<Vec<u8>> = (self.seen..core.log().len())
-            .filter_map(|position| convert::event_to_proto(core, position, see))
-            .map(|event| event.encode_to_vec())
-            .collect();
-        let own = core
-            .awaited()
-            .filter(|open| see == Viewer::Seat(open.decision.seat));
-        if let Some(open) = own {
-            let mut written = Vec::new();
-            crate::encoded::encode_decision(core, open, self.table.now, true, &mut written);
-            messages.push(written);
-        }
+        let own = match see {
+            Viewer::Seat(seat) => Some(seat),
+            Viewer::Spectator | Viewer::Everything => None,
+        };
+        let mut messages = sent_since(self.seen, &self.table, own, see);
         let awaited = core.awaited_in_public();
         let awaited = awaited.filter(|it| see != Viewer::Seat(it.seat));
         messages.push(convert::awaited_to_proto(awaited, self.table.now).encode_to_vec());
