@@ -6,7 +6,7 @@ use tonic::Status;
 
 use super::status::{field, invalid};
 use chefshat_admission::access::Caller;
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 
 /// A name with at least `shortest` characters.
 pub(super) fn checked_name(
@@ -20,7 +20,7 @@ pub(super) fn checked_name(
 
 /// The kind of a participant; `None` if unspecified.
 pub(super) fn checked_kind(kind: i32) -> Result<Option<ParticipantKind>, Status> {
-    let checked = convert::kind_from_proto("kind", kind);
+    let checked = ParticipantKind::from_proto("kind", kind);
     checked.map_err(|problem| field("KIND_REFUSED", &problem))
 }
 

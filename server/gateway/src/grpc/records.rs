@@ -412,20 +412,13 @@ fn is_withheld_in(line: &v1::RecordLine) -> bool {
 /// Checks that the enum values of a filter are known.
 fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status> {
     let filter = filter.unwrap_or_default();
-    let wrong = if v1::RoomState::try_from(filter.state).is_err() {
-        Some("state")
-    } else if v1::ParticipantKind::try_from(filter.kind).is_err() {
-        Some("kind")
-    } else if v1::GameOrigin::try_from(filter.origin).is_err() {
-        Some("origin")
-    } else {
-        None
-    };
-    match wrong {
-        Some(name) => {
-            let problem = "not a value of this enum";
-            Err(invalid("FILTER_REFUSED", name, problem))
-        }
+    let unknown = [
+        ("state", v1::RoomState::try_from(filter.state).is_err()),
+        ("kind", v1::ParticipantKind::try_from(filter.kind).is_err()),
+        ("origin", v1::GameOrigin::try_from(filter.origin).is_err()),
+    ];
+    match unknown.into_iter().find(|(_, is_unknown)| *is_unknown) {
+        Some((name, _)) => Err(invalid("FILTER_REFUSED", name, "not a value of this enum")),
         None => Ok(filter),
     }
 }

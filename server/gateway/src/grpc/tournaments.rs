@@ -43,7 +43,7 @@ use chefshat_room::ids::{
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
 use chefshat_store::StoreError;
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;
@@ -297,7 +297,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let (_, extensions, message) = request.into_parts();
-        let state = convert::tournament_state_from_proto("state", message.state)
+        let state = State::from_proto("state", message.state)
             .map_err(|problem| field("STATE_REFUSED", &problem))?;
         let listing = TournamentList {
             service: self,

@@ -12,9 +12,9 @@ use chefshat_referee::{Fact, ShiftFacts, ShiftStory};
 use prost::Message as _;
 use tracing::error;
 
-use super::decision::source_to_proto;
 use super::event::event_to_proto;
 use super::marker::last_marker;
+use super::mirrored::Mirrored as _;
 use super::policy::millis;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
@@ -238,7 +238,7 @@ fn decision(entry: &Entry, decided: &Decided, attempts: Vec<u32>) -> v1::Decisio
     let annotations = decided.annotations.as_ref();
     v1::DecisionRecord {
         seat: seat_number(decided.seat),
-        source: source_to_proto(decided.source).into(),
+        source: decided.source.to_proto().into(),
         decision_time_us: decided.time_us,
         bank_left_ms: decided.bank_left_ms,
         invalid_attempts: attempts,
