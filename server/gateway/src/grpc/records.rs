@@ -23,10 +23,10 @@ use super::limits::charged;
 use super::lookup::RecordView;
 use super::pace::Pace;
 use super::pages;
-use super::recorded::{Recorded, SERIES_OPEN};
+use super::recorded::Recorded;
 use super::status::{
-    OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, has_reason,
-    invalid, read_failed, status,
+    OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, SERIES_OPEN, UNREADABLE, disk_nearly_full,
+    has_reason, invalid, read_failed, status,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};

@@ -101,7 +101,7 @@ impl RoomCalls {
             if !room_id.is_empty() {
                 self.lookup().room(caller, room_id).await?;
             }
-            return Err(join_code_wrong());
+            return Err(status::join_code_wrong());
         };
         self.lookup().check_joining(caller, handle.id())?;
         Ok(handle)
@@ -396,7 +396,7 @@ impl RoomService for RoomCalls {
         }
         let join_code = normal_code(&request.join_code);
         if join_code.len() != CODE_LENGTH {
-            return Err(join_code_wrong());
+            return Err(status::join_code_wrong());
         }
         loop {
             let earlier = handle.next_join_code();
@@ -413,15 +413,6 @@ impl RoomService for RoomCalls {
             }
         }
     }
-}
-
-fn join_code_wrong() -> Status {
-    status::status(
-        Code::PermissionDenied,
-        "JOIN_CODE_WRONG",
-        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one",
-        [("field", "join_code")],
-    )
 }
 
 #[cfg(test)]

@@ -55,6 +55,79 @@ fn with_reason(
     )
 }
 
+/// Statuses that are always the same: their names, codes, reasons, messages, and the fields at fault.
+macro_rules! statuses {
+    ($($(#[$doc:meta])* $vis:vis $name:ident: $code:ident, $reason:tt $(in $field:literal)?, $message:literal;)+) => {
+        $(
+            $(#[$doc])*
+            $vis fn $name() -> Status {
+                status(Code::$code, $reason, $message, [$(("field", $field))?])
+            }
+        )+
+    };
+}
+
+statuses! {
+    /// Too many calls to games wait for a stream.
+    pub calls_not_taken: Unavailable, "CALLS_NOT_TAKEN",
+        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream";
+    /// Replies to commands wait for a stream that is not read.
+    updates_not_taken: Unavailable, "UPDATES_NOT_TAKEN",
+        "replies to commands wait, and the stream is not read; connect again, and read what it sends";
+    /// No tournament has this id.
+    pub tournament_unknown: NotFound, "TOURNAMENT_UNKNOWN" in "tournament_id",
+        "this tournament does not exist";
+    /// There is no such room.
+    pub room_unknown: NotFound, "ROOM_UNKNOWN",
+        "this room does not exist; it may have been closed";
+    /// No study has this id, or another owner token.
+    pub(super) study_unknown: NotFound, "STUDY_UNKNOWN" in "study_id",
+        "this server has no study with this id and owner token";
+    /// No participant has this link.
+    pub(super) link_unknown: Unauthenticated, "LINK_UNKNOWN" in "link",
+        "this is not a link of a study on this server; check that it is complete";
+    /// No room has this join code.
+    pub(super) join_code_wrong: PermissionDenied, "JOIN_CODE_WRONG" in "join_code",
+        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one";
+    /// Those of this kind do not take part in a tournament.
+    pub(super) kind_not_admitted: FailedPrecondition, "KIND_NOT_ADMITTED" in "kind",
+        "this tournament does not admit this kind of participant";
+    /// Games with the same deals are being played.
+    pub(super) series_open: FailedPrecondition, SERIES_OPEN in "game_id",
+        "other games with the same deals are being played; the record is available when they have ended";
+    /// A token is not that of the room's creator.
+    pub owner_token_wrong: PermissionDenied, "OWNER_TOKEN_WRONG" in "owner_token",
+        "this is not the owner token that CreateRoom returned for this room";
+    /// No seat has this ticket.
+    pub ticket_unknown: Unauthenticated, "TICKET_UNKNOWN" in "ticket",
+        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again";
+    /// No physical table has this ticket.
+    pub table_unknown: Unauthenticated, "TICKET_UNKNOWN" in "table_ticket",
+        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament";
+    /// The server's store failed, and the server stops.
+    pub store_failed: Unavailable, "STORE_FAILED",
+        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back";
+    /// The server failed in a way that clients cannot resolve.
+    pub internal: Internal, "INTERNAL",
+        "the server failed to do this; see its log";
+    /// The server is shutting down.
+    pub shutting_down: Unavailable, "SHUTTING_DOWN",
+        "the server is shutting down";
+    /// A spectator was disconnected because it reads too slowly.
+    pub spectator_too_slow: ResourceExhausted, "SPECTATOR_TOO_SLOW",
+        "the stream was not read fast enough; watch again from the number after the last event received";
+    /// A room became unreachable: it has just ended, or was suspended because the server stops.
+    pub room_gone: Unavailable, "ROOM_GONE",
+        "the room cannot be reached here: it has just ended, the server is stopping, or it does not reach the one that has the room; connect again";
+    /// This node does not have what a request is about. Only nodes see it: the one that has passed the
+    /// request on looks for the owner again.
+    not_owner: Unavailable, NOT_OWNER,
+        "another node has this room or tournament";
+    /// The node that has a room or tournament cannot be reached, or is just handing it over.
+    pub owner_unreachable: Unavailable, OWNER_UNREACHABLE,
+        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again";
+}
+
 /// The status for a refused request of a vector stream.
 pub fn vector_refused(error: RequestError) -> Status {
     let code = match error.reason {
@@ -64,26 +137,6 @@ pub fn vector_refused(error: RequestError) -> Status {
     let metadata = error.metadata.into_iter();
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value));
     with_reason(code, error.reason, error.message, metadata.collect())
-}
-
-/// Too many calls to games wait for a stream.
-pub fn calls_not_taken() -> Status {
-    status(
-        Code::Unavailable,
-        "CALLS_NOT_TAKEN",
-        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream",
-        [],
-    )
-}
-
-/// Replies to commands wait for a stream that is not read.
-fn updates_not_taken() -> Status {
-    status(
-        Code::Unavailable,
-        "UPDATES_NOT_TAKEN",
-        "replies to commands wait, and the stream is not read; connect again, and read what it sends",
-        [],
-    )
 }
 
 /// Whether a status has this reason.
@@ -124,6 +177,9 @@ pub fn invalid(reason: &str, name: &'static str, problem: impl Into<String>) -> 
 /// Reason of the error while the server that has what a call is about cannot be reached.
 pub(super) const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
 
+/// Reason of the error while games with the same deals are being played.
+pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
+
 /// The status for a client when the store cannot be read.
 pub fn read_failed(error: StoreError) -> Status {
     tracing::error!(%error, "reading a record failed");
@@ -143,56 +199,6 @@ pub const RECORD_UNREADABLE: &str = "RECORD_UNREADABLE";
 /// Its message.
 pub const UNREADABLE: &str = "the server has this record but cannot read it; its log says why";
 
-/// No tournament has this id.
-pub fn tournament_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "TOURNAMENT_UNKNOWN",
-        "this tournament does not exist",
-        [("field", "tournament_id")],
-    )
-}
-
-/// There is no such room.
-pub fn room_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "ROOM_UNKNOWN",
-        "this room does not exist; it may have been closed",
-        [],
-    )
-}
-
-/// A token is not that of the room's creator.
-pub fn owner_token_wrong() -> Status {
-    status(
-        Code::PermissionDenied,
-        "OWNER_TOKEN_WRONG",
-        "this is not the owner token that CreateRoom returned for this room",
-        [("field", "owner_token")],
-    )
-}
-
-/// No seat has this ticket.
-pub fn ticket_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "TICKET_UNKNOWN",
-        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again",
-        [("field", "ticket")],
-    )
-}
-
-/// No physical table has this ticket.
-pub fn table_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "TICKET_UNKNOWN",
-        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament",
-        [("field", "table_ticket")],
-    )
-}
-
 /// A request id was reused with other content.
 pub fn request_id_used(message: &str) -> Status {
     status(
@@ -208,26 +214,6 @@ pub fn disk_nearly_full(message: &str) -> Status {
     status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
 }
 
-/// The server's store failed, and the server stops.
-pub fn store_failed() -> Status {
-    status(
-        Code::Unavailable,
-        "STORE_FAILED",
-        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back",
-        [],
-    )
-}
-
-/// The server failed in a way that clients cannot resolve.
-pub fn internal() -> Status {
-    status(
-        Code::Internal,
-        "INTERNAL",
-        "the server failed to do this; see its log",
-        [],
-    )
-}
-
 /// The status for a client that has not received a part of `what` within `limit`.
 pub(super) fn reader_too_slow(what: &str, limit: Duration) -> Status {
     let seconds = limit.as_secs();
@@ -239,29 +225,9 @@ pub(super) fn reader_too_slow(what: &str, limit: Duration) -> Status {
     )
 }
 
-/// The server is shutting down.
-pub fn shutting_down() -> Status {
-    status(
-        Code::Unavailable,
-        "SHUTTING_DOWN",
-        "the server is shutting down",
-        [],
-    )
-}
-
 /// No other node reaches this one, which therefore accepts nothing new.
 fn node_not_reached(message: &str) -> Status {
     status(Code::Unavailable, "NODE_NOT_REACHED", message, [])
-}
-
-/// A spectator was disconnected because it reads too slowly.
-pub fn spectator_too_slow() -> Status {
-    status(
-        Code::ResourceExhausted,
-        "SPECTATOR_TOO_SLOW",
-        "the stream was not read fast enough; watch again from the number after the last event received",
-        [],
-    )
 }
 
 /// The status for the end of a stream.
@@ -278,29 +244,8 @@ pub fn stream_ended(end: StreamEnd) -> Status {
     }
 }
 
-/// A room became unreachable: it has just ended, or was suspended because the server stops.
-pub fn room_gone() -> Status {
-    status(
-        Code::Unavailable,
-        "ROOM_GONE",
-        "the room cannot be reached here: it has just ended, the server is stopping, or it does not reach the one that has the room; connect again",
-        [],
-    )
-}
-
 /// Reason of [`not_owner`].
 const NOT_OWNER: &str = "NOT_OWNER";
-
-/// This node does not have what a request is about. Only nodes see it: the one that has passed the
-/// request on looks for the owner again.
-fn not_owner() -> Status {
-    status(
-        Code::Unavailable,
-        NOT_OWNER,
-        "another node has this room or tournament",
-        [],
-    )
-}
 
 /// What a request is about is at another node. `forward` sends the request there.
 pub fn elsewhere(elsewhere: Elsewhere) -> Status {
@@ -340,16 +285,6 @@ where
         RoomError::SecretUnknown => unknown(),
         RoomError::Refused(error) => Refusal::from(error).into(),
     }
-}
-
-/// The node that has a room or tournament cannot be reached, or is just handing it over.
-pub fn owner_unreachable() -> Status {
-    status(
-        Code::Unavailable,
-        OWNER_UNREACHABLE,
-        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again",
-        [],
-    )
 }
 
 impl From<RoomGone> for Refusal {

@@ -25,7 +25,9 @@ use super::forward::Gateway;
 use super::limits::make_way;
 use super::lists;
 use super::lookup::Lookup;
-use super::status::{Refusal, internal, invalid, not_created, read_failed, shutting_down, status};
+use super::status::{
+    Refusal, internal, invalid, not_created, read_failed, shutting_down, status, study_unknown,
+};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
@@ -500,15 +502,6 @@ fn content_of(settings: &v1::StudySettings) -> Vec<u8> {
     let mut content = settings.encode_to_vec();
     content.extend(levels.join("\n").into_bytes());
     content
-}
-
-fn study_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "STUDY_UNKNOWN",
-        "this server has no study with this id and owner token",
-        [("field", "study_id")],
-    )
 }
 
 /// The status for a study that is not deleted.

@@ -24,7 +24,8 @@ use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    Refusal, field, not_created, request_id_used, shutting_down, status, ticket_unknown,
+    Refusal, field, kind_not_admitted, not_created, request_id_used, shutting_down, status,
+    ticket_unknown,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
@@ -611,15 +612,6 @@ fn refused_within(outer: &'static str, problem: FieldProblem) -> Status {
 
 fn settings_refused(problem: SettingsProblem) -> Status {
     refused(FieldProblem::new(problem.field, problem.problem))
-}
-
-fn kind_not_admitted() -> Status {
-    status(
-        Code::FailedPrecondition,
-        "KIND_NOT_ADMITTED",
-        "this tournament does not admit this kind of participant",
-        [("field", "kind")],
-    )
 }
 
 fn join_refused(refusal: JoinRefusal) -> Status {

@@ -15,7 +15,7 @@ use tonic::{Code, Request, Response, Status};
 use super::{StudyCalls, code_of, not_done, refused};
 use crate::grpc::follow::{self, Responses, Sender, changed};
 use crate::grpc::limits::charged;
-use crate::grpc::status::{Refusal, invalid, shutting_down, status, store_failed};
+use crate::grpc::status::{Refusal, invalid, link_unknown, shutting_down, status, store_failed};
 use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StreamKind;
@@ -98,15 +98,6 @@ impl StudyCalls {
         rooms.may_store(key, bytes).map_err(Refusal::from)?;
         Ok(answers)
     }
-}
-
-fn link_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "LINK_UNKNOWN",
-        "this is not a link of a study on this server; check that it is complete",
-        [("field", "link")],
-    )
 }
 
 /// The status for somebody with this id at the panel who may not begin: it names where the page sends
