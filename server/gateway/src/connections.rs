@@ -27,6 +27,7 @@ use tracing::{debug, warn};
 
 use chefshat_admission::access::TokenId;
 use chefshat_admission::limits::{FairSemaphore, Key, LogPace, Permit, Shares};
+use chefshat_base::clock::millis;
 use chefshat_base::lock::Lock;
 use chefshat_base::metrics::{Counted, Metrics};
 use chefshat_base::proxies::TrustedProxies;
@@ -288,7 +289,7 @@ impl Unread {
     }
 
     fn elapsed_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        millis(self.began.elapsed())
     }
 
     /// Whether bytes wait, of which none has been sent for [`STALLED_LIMIT`].

@@ -28,6 +28,7 @@ use super::status::{
 use super::tournaments;
 use crate::connections::{Client, Connections};
 use chefshat_admission::limits::Key;
+use chefshat_base::clock::millis;
 use chefshat_base::tasks::short;
 use chefshat_hosting::cluster::{FoundBy, Location};
 use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
@@ -408,7 +409,7 @@ fn described(client: &Client) -> v1::ConnectedClient {
         client_id: client.id,
         address: (client.address).map_or_else(String::new, |it| it.to_string()),
         token_id: client.token().map_or_else(String::new, |id| id.to_string()),
-        connected_at_ms: u64::try_from(since.as_millis()).unwrap_or(u64::MAX),
+        connected_at_ms: millis(since),
         calls: client.calls(),
         streams: client.streams() as u64,
     }

@@ -16,7 +16,7 @@ use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
-use chefshat_base::clock::{RoomClock, TimeOfDay};
+use chefshat_base::clock::{RoomClock, TimeOfDay, millis};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, GameId, RoomId, SecretHash, StudyId};
 use chefshat_store::StoreError;
@@ -434,7 +434,7 @@ impl StudyTask {
 
     /// Since the task began, by a clock that never jumps.
     fn elapsed_ms(&self) -> u64 {
-        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+        millis(self.clock.now())
     }
 
     fn show_connected(&mut self, number: u32, connected: bool) {

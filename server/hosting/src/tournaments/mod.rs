@@ -35,12 +35,12 @@ use crate::config::MAX_START_AHEAD;
 use crate::journaled::{Folded, New, Registry, owner_of};
 use crate::rooms::{self, CODES_TRIED, Rooms};
 use chefshat_admission::limits::Key;
-use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
+use chefshat_base::clock::{TimeOfDay, millis, since_epoch_ms};
 use chefshat_room::ids::{GameId, RequestKey, TournamentToken, join_code, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
-use state::{Common, TournamentShared, TournamentState, millis};
+use state::{Common, TournamentShared, TournamentState};
 use task::TournamentTask;
 
 /// Why a tournament was not created.

@@ -24,7 +24,7 @@ use event::{Event, Outcomes};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
 use chefshat_base::SERVER_VERSION;
-use chefshat_base::clock::since_epoch;
+use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::lock::Lock;
 use chefshat_base::metrics::{Metrics, WebhookOutcome};
 
@@ -128,7 +128,7 @@ impl Webhooks {
         let body = json!({
             "id": id,
             "type": kind,
-            "at_ms": u64::try_from(since_epoch().as_millis()).unwrap_or(u64::MAX),
+            "at_ms": since_epoch_ms(),
             "server_version": SERVER_VERSION,
             "data": data(),
         });
