@@ -17,7 +17,7 @@ pub use chefshat_store as store;
 pub use chefshat_wire::{convert, outbox};
 
 use chefshat_base::{metrics, tasks};
-use chefshat_gateway::{forwarded, grpc, handshakes};
+use chefshat_gateway::{forwarded, front, grpc, handshakes};
 #[cfg(test)]
 use chefshat_hosting::room;
 use chefshat_hosting::{node, retention};

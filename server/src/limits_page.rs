@@ -1,6 +1,5 @@
 //! The tables of limits in docs/hosting.md, made from the constants.
 
-use std::fmt::Display;
 use std::path::Path;
 use std::time::Duration;
 
@@ -23,20 +22,8 @@ use crate::room::MAX_SPECTATORS;
 use crate::store::MAX_CONCURRENT_RECORDS;
 use crate::web::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING};
 use crate::webhooks::MAX_WAITING;
+use chefshat_record::words::grouped as number;
 use chefshat_room::{SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED};
-
-/// A number with commas between thousands.
-fn number(number: impl Display) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
 
 fn seconds(time: Duration) -> String {
     format!("{} s", time.as_secs())

@@ -42,6 +42,7 @@ use crate::config::{
 };
 use crate::connections::{self, Client, Connection, Connections, Limits, Listener};
 use crate::forwarded::note_clients;
+use crate::front::InFront;
 use crate::grpc;
 use crate::handshakes::Handshakes;
 use crate::limits::frames::MAX_HEADER_BYTES;
@@ -357,23 +358,22 @@ impl Server {
         } = self;
         let is_node = node.is_some();
         let closing = CancellationToken::new();
-        let until_closing =
-            |task, work| named(task, closing.clone().run_until_cancelled_owned(work));
-        tracker.spawn(until_closing(
+        let spawn = |task, work: BoxFuture<'static, ()>| {
+            let until_closing = closing.clone().run_until_cancelled_owned(work);
+            tracker.spawn(named(task, until_closing))
+        };
+        spawn(
             LongTask::StalledConnections,
             Arc::clone(&connections).close_stalled().boxed(),
-        ));
+        );
         let retention = Retention::new(Arc::clone(&rooms));
         if let Some(keep) = config.keep_games {
-            tracker.spawn(until_closing(
-                LongTask::Retention,
-                retention.clone().follow(keep).boxed(),
-            ));
+            spawn(LongTask::Retention, retention.clone().follow(keep).boxed());
         }
-        tracker.spawn(until_closing(
+        spawn(
             LongTask::StudyDeletion,
             Arc::clone(&studies).delete_when_due().boxed(),
-        ));
+        );
         // Above any encryption, because it reads frames.
         let first_bytes = config.first_bytes_timeout;
         let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));
@@ -396,12 +396,9 @@ impl Server {
             node.as_ref().map(ClusterNode::serves),
             store.metrics().cloned(),
         );
-        let following = tracker.spawn(until_closing(LongTask::Health, following.boxed()));
+        let following = spawn(LongTask::Health, following.boxed());
 
-        tracker.spawn(until_closing(
-            LongTask::TokenFile,
-            Arc::clone(&access).follow().boxed(),
-        ));
+        spawn(LongTask::TokenFile, Arc::clone(&access).follow().boxed());
         let delivering = rooms.webhooks().clone().deliver(closing.clone());
         tracker.spawn(named(LongTask::Webhooks, delivering));
         let encrypted = tls.is_some();
@@ -411,7 +408,7 @@ impl Server {
         let shown: Vec<_> = shown.into_iter().flatten().collect();
         for (_, tls) in &shown {
             let follow = Arc::clone(tls).follow();
-            tracker.spawn(until_closing(LongTask::Certificates, follow.boxed()));
+            spawn(LongTask::Certificates, follow.boxed());
         }
         scrape::add_certificates(rooms.metrics(), shown);
         let directory = Arc::clone(rooms.directory());
@@ -419,14 +416,14 @@ impl Server {
         if let Some(lease) = rooms.lease() {
             let joining =
                 joining::be_reached(Arc::clone(lease), Arc::clone(&directory), to_others.clone());
-            tracker.spawn(until_closing(LongTask::Joining, joining.boxed()));
+            spawn(LongTask::Joining, joining.boxed());
         }
         if let Some(peers) = to_others.clone() {
             let signing_key = rooms.signing_key();
             let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
             let metrics = Arc::clone(rooms.metrics());
             let probing = probing::probe(Arc::clone(&directory), peers, signing_key, metrics);
-            tracker.spawn(until_closing(LongTask::Probing, probing.boxed()));
+            spawn(LongTask::Probing, probing.boxed());
         }
         let forwarding = to_others.clone().map(|to_others| {
             grpc::ForwardLayer::new(Arc::clone(&directory), to_others, Arc::clone(&calls))
@@ -496,7 +493,7 @@ impl Server {
                 config.painter.clone(),
             )?)
             .layer(tonic_web::GrpcWebLayer::new())
-            .layer(grpc::HeartbeatLayer)
+            .layer(InFront(grpc::HeartbeatLayer))
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))
             .layer(grpc::AccessLayer::new(

@@ -231,7 +231,12 @@ pub type TimeOfDay = fn() -> u64;
 
 /// The time of day, milliseconds since the Unix epoch.
 pub fn since_epoch_ms() -> u64 {
-    u64::try_from(since_epoch().as_millis()).unwrap_or(u64::MAX)
+    millis(since_epoch())
+}
+
+/// Whole milliseconds.
+pub fn millis(time: Duration) -> u64 {
+    u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
 }
 
 /// The time of day since the Unix epoch; zero if the system clock is set before it.

@@ -3,6 +3,7 @@
 
 pub mod clock;
 pub mod file_watch;
+pub mod lock;
 pub mod metrics;
 pub mod post;
 pub mod proxies;

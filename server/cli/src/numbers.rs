@@ -2,20 +2,7 @@
 
 use std::time::Duration;
 
-pub use chefshat_record::words::ordinal;
-
-/// A number with grouped thousands: `1,234,567`.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
+pub use chefshat_record::words::{grouped, ordinal};
 
 /// `1 turn`, `2 turns`, `1,000 turns`, `2 studies`.
 pub fn counted(count: u64, what: &str) -> String {

@@ -9,7 +9,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
-use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::sync::{Arc, Weak};
 use std::task::{Context, Poll};
 use std::time::{Duration, SystemTime};
 
@@ -27,6 +27,8 @@ use tracing::{debug, warn};
 
 use chefshat_admission::access::TokenId;
 use chefshat_admission::limits::{FairSemaphore, Key, LogPace, Permit, Shares};
+use chefshat_base::clock::millis;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::{Counted, Metrics};
 use chefshat_base::proxies::TrustedProxies;
 
@@ -118,7 +120,7 @@ pub struct Limits {
 pub struct Connections {
     places: Arc<FairSemaphore>,
     trusted_proxies: TrustedProxies,
-    clients: Mutex<BTreeMap<u64, Weak<Client>>>,
+    clients: Lock<BTreeMap<u64, Weak<Client>>>,
     next: AtomicU64,
     metrics: Arc<Metrics>,
     logged: LogPace,
@@ -141,7 +143,7 @@ impl Connections {
         Arc::new(Self {
             places: FairSemaphore::new(max_connections, limits.shares),
             trusted_proxies: limits.trusted_proxies,
-            clients: Mutex::default(),
+            clients: Lock::default(),
             next: AtomicU64::new(1),
             metrics,
             logged: LogPace::new(1),
@@ -150,12 +152,16 @@ impl Connections {
 
     /// The clients that are connected, oldest first.
     pub fn clients(&self) -> Vec<Arc<Client>> {
-        self.lock().values().filter_map(Weak::upgrade).collect()
+        self.clients
+            .lock()
+            .values()
+            .filter_map(Weak::upgrade)
+            .collect()
     }
 
     /// The client with this number.
     pub fn client(&self, id: u64) -> Option<Arc<Client>> {
-        self.lock().get(&id)?.upgrade()
+        self.clients.lock().get(&id)?.upgrade()
     }
 
     /// Number of places for connections.
@@ -202,16 +208,16 @@ impl Connections {
             key,
             since: SystemTime::now(),
             calls: AtomicU64::new(0),
-            streams: Mutex::default(),
-            token: Mutex::default(),
-            answers: Mutex::default(),
+            streams: Lock::default(),
+            token: Lock::default(),
+            answers: Lock::default(),
             closing: AtomicBool::new(false),
             waker: AtomicWaker::new(),
             connections: Arc::downgrade(self),
             _counted: Counted::new(self.metrics.connections()),
             _place: place,
         });
-        self.lock().insert(id, Arc::downgrade(&client));
+        self.clients.lock().insert(id, Arc::downgrade(&client));
         Some(client)
     }
 
@@ -223,10 +229,6 @@ impl Connections {
             warn!(reason, %cause, open, "connections are refused");
         }
     }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Weak<Client>>> {
-        (self.clients.lock()).expect("nothing panics under this lock")
-    }
 }
 
 /// The clients to disconnect so that each caller leaves at most [`MAX_UNREAD`] bytes unread: those that
@@ -235,7 +237,7 @@ fn with_too_much_unread(clients: &[Arc<Client>]) -> Vec<&Arc<Client>> {
     let mut by_caller: BTreeMap<Key, Vec<(usize, &Arc<Client>)>> = BTreeMap::new();
     for client in clients {
         let mut unread: BTreeMap<Key, usize> = BTreeMap::new();
-        for stream in client.unread().values().filter(|it| it.is_stalled()) {
+        for stream in client.streams.lock().values().filter(|it| it.is_stalled()) {
             *unread.entry(stream.key).or_default() += stream.bytes.load(Relaxed);
         }
         for (key, bytes) in unread {
@@ -287,7 +289,7 @@ impl Unread {
     }
 
     fn elapsed_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        millis(self.began.elapsed())
     }
 
     /// Whether bytes wait, of which none has been sent for [`STALLED_LIMIT`].
@@ -310,12 +312,12 @@ pub struct Client {
     pub since: SystemTime,
     calls: AtomicU64,
     /// Its open streams, by the number of the call.
-    streams: Mutex<BTreeMap<u64, Arc<Unread>>>,
+    streams: Lock<BTreeMap<u64, Arc<Unread>>>,
     /// The token that it used last.
-    token: Mutex<Option<TokenId>>,
+    token: Lock<Option<TokenId>>,
     /// Answers that it has not read completely, by the number of the call, with the time at which
     /// they were ready, or it read some of them.
-    answers: Mutex<BTreeMap<u64, Instant>>,
+    answers: Lock<BTreeMap<u64, Instant>>,
     closing: AtomicBool,
     waker: AtomicWaker,
     connections: Weak<Connections>,
@@ -341,18 +343,18 @@ impl Client {
 
     /// Number of its open streams.
     pub fn streams(&self) -> usize {
-        self.unread().len()
+        self.streams.lock().len()
     }
 
     /// The token that it used last.
     pub fn token(&self) -> Option<TokenId> {
-        *(self.token.lock()).expect("nothing panics under this lock")
+        *self.token.lock()
     }
 
     /// Counts a call with this token, if any, and returns its number.
     pub fn called(&self, token: Option<TokenId>) -> u64 {
         if token.is_some() {
-            *(self.token.lock()).expect("nothing panics under this lock") = token;
+            *self.token.lock() = token;
         }
         self.calls.fetch_add(1, Relaxed)
     }
@@ -365,30 +367,30 @@ impl Client {
             bytes: AtomicUsize::new(0),
             moved_ms: AtomicU64::new(0),
         });
-        self.unread().insert(call, Arc::clone(&unread));
+        self.streams.lock().insert(call, Arc::clone(&unread));
         unread
     }
 
     /// A stream has ended, and nothing of it waits for the client.
     pub fn stream_gone(&self, call: u64) {
-        self.unread().remove(&call);
+        self.streams.lock().remove(&call);
     }
 
     /// An answer is ready, and waits until the client reads it.
     pub fn answer_ready(&self, call: u64) {
-        self.answers().insert(call, Instant::now());
+        self.answers.lock().insert(call, Instant::now());
     }
 
     /// Some of an answer has been read.
     pub fn answer_moves(&self, call: u64) {
-        if let Some(since) = self.answers().get_mut(&call) {
+        if let Some(since) = self.answers.lock().get_mut(&call) {
             *since = Instant::now();
         }
     }
 
     /// An answer has been read, or will never be.
     pub fn answer_gone(&self, call: u64) {
-        self.answers().remove(&call);
+        self.answers.lock().remove(&call);
     }
 
     /// Closes the connection.
@@ -406,22 +408,14 @@ impl Client {
     }
 
     fn oldest_answer(&self) -> Option<Instant> {
-        self.answers().values().min().copied()
-    }
-
-    fn unread(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<Unread>>> {
-        (self.streams.lock()).expect("nothing panics under this lock")
-    }
-
-    fn answers(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
-        (self.answers.lock()).expect("nothing panics under this lock")
+        self.answers.lock().values().min().copied()
     }
 }
 
 impl Drop for Client {
     fn drop(&mut self) {
         if let Some(connections) = self.connections.upgrade() {
-            connections.lock().remove(&self.id);
+            connections.clients.lock().remove(&self.id);
         }
     }
 }

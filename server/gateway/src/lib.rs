@@ -2,6 +2,7 @@
 
 pub mod connections;
 pub mod forwarded;
+pub mod front;
 pub mod grpc;
 pub mod handshakes;
 pub mod peers;

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use futures::stream::FuturesUnordered;
@@ -31,6 +31,7 @@ use crate::connections::{self, Connection, Connections, Limits};
 use crate::handshakes::Handshakes;
 use crate::tls::{MaybeTls, Tls, TlsError, TlsFiles};
 use chefshat_admission::limits::Shares;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::Metrics;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_hosting::cluster::Peer;
@@ -141,10 +142,10 @@ impl PeerPort {
         Arc::new(Peers {
             opening: Arc::new(Opening {
                 tls: self.tls.as_ref().map(|tls| tls.files.clone()),
-                config: Mutex::default(),
+                config: Lock::default(),
                 metrics: Arc::clone(metrics),
             }),
-            channels: Mutex::default(),
+            channels: Lock::default(),
         })
     }
 
@@ -193,7 +194,7 @@ impl PeerPort {
 pub struct Peers {
     opening: Arc<Opening>,
     /// By endpoint, with the time of the last use.
-    channels: Mutex<BTreeMap<Arc<str>, (Channel, Instant)>>,
+    channels: Lock<BTreeMap<Arc<str>, (Channel, Instant)>>,
 }
 
 impl Peers {
@@ -212,7 +213,7 @@ impl Peers {
     /// The connection to another node.
     pub fn channel(&self, peer: &Peer) -> Channel {
         let now = Instant::now();
-        let mut channels = (self.channels.lock()).expect("nothing panics under this lock");
+        let mut channels = self.channels.lock();
         // Nodes come and go, often with new endpoints. Streams keep their connection.
         channels.retain(|endpoint, (_, used)| {
             *endpoint == peer.endpoint || now.duration_since(*used) < CHANNEL_IDLE
@@ -310,7 +311,7 @@ type ToPeer = Either<TcpStream, Box<TlsStream<TcpStream>>>;
 struct Opening {
     tls: Option<TlsFiles>,
     /// What the files were when they could be used last.
-    config: Mutex<Option<Arc<ClientConfig>>>,
+    config: Lock<Option<Arc<ClientConfig>>>,
     metrics: Arc<Metrics>,
 }
 
@@ -328,7 +329,7 @@ impl Opening {
 
     /// The files as they are now, since they may have been renewed; or as they could be used last.
     fn config(&self, files: &TlsFiles) -> Result<Arc<ClientConfig>, TlsError> {
-        let mut last = (self.config.lock()).expect("nothing panics under this lock");
+        let mut last = self.config.lock();
         match (files.client_config(), &*last) {
             (Ok(config), _) => Ok(Arc::clone(last.insert(config))),
             (Err(_), Some(last)) => Ok(Arc::clone(last)),
@@ -541,7 +542,7 @@ mod tests {
             peers.channel(&peer(0));
             tokio::time::advance(Duration::from_secs(60)).await;
         }
-        let live = peers.channels.lock().expect("nothing panicked").len();
+        let live = peers.channels.lock().len();
         assert_eq!(live, 11, "those of ten minutes, and the one in use");
     }
 

@@ -4,7 +4,7 @@
 
 use std::io;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -21,6 +21,7 @@ use tracing::{debug, error, info};
 use crate::handshakes::{Handshake, Handshakes};
 use chefshat_admission::limits::Key;
 use chefshat_base::file_watch::FileWatch;
+use chefshat_base::lock::Lock;
 use chefshat_base::tasks::short;
 use chefshat_base::tls_files::ServerTls;
 pub use chefshat_base::tls_files::{TlsError, TlsFiles};
@@ -34,7 +35,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Tls {
     files: TlsFiles,
-    watch: Mutex<FileWatch>,
+    watch: Lock<FileWatch>,
     current: ArcSwap<ServerTls>,
 }
 
@@ -45,7 +46,7 @@ impl Tls {
     /// They cannot be used.
     pub fn open(files: TlsFiles) -> Result<Arc<Self>, TlsError> {
         // Watched before they are read: a later change is noticed.
-        let watch = Mutex::new(FileWatch::of(files.paths()));
+        let watch = Lock::new(FileWatch::of(files.paths()));
         let current = ArcSwap::from_pointee(files.read()?);
         Ok(Arc::new(Self {
             files,
@@ -70,7 +71,7 @@ impl Tls {
 
     /// Reads the files again if they have changed. Blocks.
     fn read_if_changed(&self) {
-        let mut watch = (self.watch.lock()).expect("no code that holds this lock can panic");
+        let mut watch = self.watch.lock();
         let read = watch.read_changed(|| {
             self.current.store(Arc::new(self.files.read()?));
             info!("the certificate was read again");

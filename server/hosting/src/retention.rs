@@ -19,7 +19,7 @@ use tracing::{error, info, warn};
 use crate::config::{DELETION_PAUSE, GAMES_DELETED_AT_ONCE, KeepGames};
 use crate::confirmed_time::ConfirmedTime;
 use crate::rooms::Rooms;
-use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
+use chefshat_base::clock::{TimeOfDay, millis, since_epoch_ms};
 use chefshat_base::tasks::short;
 use chefshat_store::samples::Undeleted;
 use chefshat_store::{DiskUsage, Keep, StoreError};
@@ -38,13 +38,10 @@ fn kept_at(setting: KeepGames, confirmed_ms: Option<u64>) -> Option<Keep> {
             newest: Some(count),
             ..Keep::default()
         },
-        KeepGames::For(time) => {
-            let ms = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
-            Keep {
-                ended_since_ms: Some(confirmed_ms?.saturating_sub(ms)),
-                ..Keep::default()
-            }
-        }
+        KeepGames::For(time) => Keep {
+            ended_since_ms: Some(confirmed_ms?.saturating_sub(millis(time))),
+            ..Keep::default()
+        },
     })
 }
 

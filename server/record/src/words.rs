@@ -1,6 +1,8 @@
 //! Words of a game that texts, pictures and language models share: why the server decided, places,
 //! and what a participant says. Sentences are elsewhere: their length and their signs differ.
 
+use std::fmt::Display;
+
 use chefshat_proto::v1;
 use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 
@@ -60,6 +62,19 @@ pub fn ordinal(place: u32) -> String {
         _ => "th",
     };
     format!("{place}{ending}")
+}
+
+/// A whole number with grouped thousands: `1,234,567`.
+pub fn grouped(number: impl Display) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 /// A text of unknown origin without control characters, which a terminal would obey.

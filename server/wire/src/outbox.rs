@@ -3,8 +3,8 @@
 //! subscriber learns when there is no space, and again when there is.
 
 use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
 use futures::Stream;
@@ -15,6 +15,7 @@ use tokio::time::Instant;
 
 use crate::encoded::Updates;
 use chefshat_base::clock::RoomClock;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::Queue;
 
 /// Capacity of an outbox, counted in updates and events: one for each seat that a stream may have.
@@ -120,7 +121,7 @@ pub enum StreamEnd {
 /// The updates queued for one stream.
 pub struct Outbox {
     capacity: usize,
-    waiting: Mutex<Waiting>,
+    waiting: Lock<Waiting>,
     waker: AtomicWaker,
     /// Notified when the client has gone.
     gone: Notify,
@@ -142,7 +143,7 @@ struct Waiting {
 impl Queue for Outbox {
     /// The queued updates and events.
     fn depth(&self) -> usize {
-        self.lock().weight
+        self.waiting.lock().weight
     }
 }
 
@@ -156,7 +157,7 @@ impl Outbox {
     pub fn with_capacity(capacity: usize) -> (Arc<Self>, OutboxStream) {
         let outbox = Arc::new(Self {
             capacity,
-            waiting: Mutex::new(Waiting {
+            waiting: Lock::new(Waiting {
                 updates: Updates::default(),
                 weight: 0,
                 stamps: SmallVec::new(),
@@ -182,7 +183,7 @@ impl Outbox {
         on_space: Option<&Arc<dyn OnSpace>>,
     ) -> bool {
         let weight = updates.weight();
-        let mut waiting = self.lock();
+        let mut waiting = self.waiting.lock();
         if waiting.abandoned {
             *updates = Updates::default();
             return true;
@@ -206,7 +207,7 @@ impl Outbox {
 
     /// Queues the last updates of a subscriber, even if there is no space.
     pub fn push_last(&self, updates: &mut Updates) {
-        let mut waiting = self.lock();
+        let mut waiting = self.waiting.lock();
         if !waiting.abandoned {
             waiting.weight += updates.weight();
             waiting.updates.append(updates);
@@ -217,7 +218,7 @@ impl Outbox {
 
     /// Ends the stream after everything queued has been taken. Only the first end counts.
     pub fn end(&self, end: StreamEnd) {
-        let mut waiting = self.lock();
+        let mut waiting = self.waiting.lock();
         if !waiting.ended {
             waiting.ended = true;
             waiting.end = Some(end);
@@ -228,7 +229,7 @@ impl Outbox {
 
     /// Ends the stream now and drops everything queued.
     pub fn cut(&self, end: StreamEnd) {
-        let mut waiting = self.lock();
+        let mut waiting = self.waiting.lock();
         waiting.updates = Updates::default();
         waiting.weight = 0;
         waiting.ended = true;
@@ -266,19 +267,13 @@ impl Outbox {
 
     /// Whether updates still reach the client: it has not gone, and its stream has not been ended.
     pub fn is_open(&self) -> bool {
-        let waiting = self.lock();
+        let waiting = self.waiting.lock();
         !(waiting.ended || waiting.abandoned)
     }
 
     /// Whether the client has gone and nothing in here will be read.
     pub fn is_abandoned(&self) -> bool {
-        self.lock().abandoned
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Waiting> {
-        self.waiting
-            .lock()
-            .expect("no code that holds this lock can panic")
+        self.waiting.lock().abandoned
     }
 }
 
@@ -299,7 +294,7 @@ impl Stream for OutboxStream {
 
     fn poll_next(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         self.outbox.waker.register(context.waker());
-        let mut waiting = self.outbox.lock();
+        let mut waiting = self.outbox.waiting.lock();
         if waiting.updates.is_empty() {
             return match waiting.end.take() {
                 None if waiting.ended => Poll::Ready(None),
@@ -335,7 +330,7 @@ impl Stream for OutboxStream {
 
 impl Drop for OutboxStream {
     fn drop(&mut self) {
-        let mut waiting = self.outbox.lock();
+        let mut waiting = self.outbox.waiting.lock();
         waiting.abandoned = true;
         waiting.updates = Updates::default();
         waiting.weight = 0;
@@ -411,7 +406,7 @@ mod tests {
         for _ in 0..100 {
             assert!(!outbox.push(&mut refused, None, Some(&on_space)));
         }
-        assert_eq!(outbox.lock().space_waiters.len(), 1);
+        assert_eq!(outbox.waiting.lock().space_waiters.len(), 1);
         assert_eq!(usize::try_from(pushed), Ok(OUTBOX_CAPACITY / 256));
         let next = stream.next().now_or_never().flatten();
         let message = next.expect("ready").expect("no error");

@@ -119,62 +119,54 @@ impl Call {
         path.split_once('/').map_or(path, |(service, _)| service)
     }
 
-    const fn streaming(self) -> Self {
-        Self {
-            streams: true,
-            charge: COST_OF_STREAM,
-            ..self
-        }
+    const fn streaming(mut self) -> Self {
+        self.streams = true;
+        self.charge = COST_OF_STREAM;
+        self
     }
 
     /// Its client receives what happens, as it happens.
-    const fn following(self) -> Self {
-        Self {
-            heartbeats: true,
-            ..self.streaming()
-        }
+    const fn following(mut self) -> Self {
+        self.heartbeats = true;
+        self.streaming()
     }
 
     /// Its client sends a stream.
-    const fn sending(self) -> Self {
-        Self {
-            sends_many: true,
-            ..self.streaming()
-        }
+    const fn sending(mut self) -> Self {
+        self.sends_many = true;
+        self.streaming().not_forwarded()
     }
 
     /// Its service limits the rate of the stream that its client sends.
-    const fn with_own_rate(self) -> Self {
-        Self {
-            has_own_rate: true,
-            ..self
-        }
+    const fn with_own_rate(mut self) -> Self {
+        self.has_own_rate = true;
+        self
     }
 
     /// Each message of its client counts as a call.
-    const fn charging_each(self) -> Self {
-        Self {
-            charges_each: true,
-            ..self
-        }
+    const fn charging_each(mut self) -> Self {
+        self.charges_each = true;
+        self
     }
 
-    const fn takes(self, bytes: usize, elements: usize, memory: usize) -> Self {
-        Self {
-            message: MessageLimits {
-                bytes,
-                elements,
-                memory,
-            },
-            ..self
-        }
+    const fn takes(mut self, bytes: usize, elements: usize, memory: usize) -> Self {
+        self.message = MessageLimits {
+            bytes,
+            elements,
+            memory,
+        };
+        self
     }
 
-    const fn forwarded(self) -> Self {
-        Self {
-            forwarded: true,
-            ..self
-        }
+    /// It is about nothing that one node has.
+    const fn not_forwarded(mut self) -> Self {
+        self.forwarded = false;
+        self
+    }
+
+    const fn reading_records(mut self) -> Self {
+        self.reads_records = true;
+        self
     }
 }
 
@@ -186,7 +178,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         reads_records: false,
         streams: false,
         heartbeats: false,
-        forwarded: false,
+        forwarded: true,
         sends_many: false,
         has_own_rate: false,
         charges_each: false,
@@ -195,319 +187,134 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
     }
 }
 
-const fn records(path: &'static str) -> Call {
-    Call {
-        reads_records: true,
-        ..call(path, Role::Spectator, Scoped::Compared)
-    }
+/// A call of the protocol, by its service and method.
+macro_rules! call {
+    ($path:literal, $role:expr, $scoped:expr) => {
+        call(concat!("/chefshat.v1.", $path), $role, $scoped)
+    };
 }
 
 /// Every call of the server. Those played most often come first.
 pub const CALLS: &[Call] = &[
-    call("/chefshat.v1.PlayService/Act", Player, Compared)
-        .forwarded()
-        .takes(MAX_MESSAGE_BYTES, 1_200, MIB),
-    call("/chefshat.v1.PlayService/Play", Player, Compared)
+    call!("PlayService/Act", Player, Compared).takes(MAX_MESSAGE_BYTES, 1_200, MIB),
+    call!("PlayService/Play", Player, Compared)
         .sending()
         .takes(MAX_MESSAGE_BYTES, 8_192, 3 * MIB),
-    call("/chefshat.v1.PlayService/Watch", Player, Compared)
+    call!("PlayService/Watch", Player, Compared)
+        .not_forwarded()
         .following()
         .takes(16 * KIB, 256, 512 * KIB),
-    call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared)
-        .following()
-        .forwarded(),
-    call("/chefshat.v1.TableService/Report", Player, Compared)
-        .forwarded()
-        .takes(MAX_MESSAGE_BYTES, 512, 512 * KIB),
-    call("/chefshat.v1.TableService/Watch", Player, Compared)
-        .following()
-        .forwarded(),
-    call("/chefshat.v1.InstrumentService/AddMarker", Host, Compared).forwarded(),
-    call(
-        "/chefshat.v1.InstrumentService/FollowMarkers",
-        Host,
-        Compared,
-    )
-    .following()
-    .forwarded(),
-    call(
-        "/chefshat.v1.InstrumentService/AddSamples",
-        Player,
-        Compared,
-    )
-    .forwarded()
-    .takes(MAX_MESSAGE_BYTES, 64, 768 * KIB),
-    call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
-    call("/chefshat.v1.RoomService/JoinRoom", Player, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/CreateRoom", Host, Refused)
-        .forwarded()
-        .takes(MAX_MESSAGE_BYTES, 512, 768 * KIB),
-    call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/SetNextRoom", Player, Compared).forwarded(),
-    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused)
-        .forwarded()
-        .takes(MAX_STUDY_MESSAGE_BYTES, 20_000, 8 * MIB),
-    call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused).forwarded(),
-    call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused).takes(
-        16 * KIB,
-        256,
-        256 * KIB,
+    call!("SpectatorService/Watch", Spectator, Compared).following(),
+    call!("TableService/Report", Player, Compared).takes(MAX_MESSAGE_BYTES, 512, 512 * KIB),
+    call!("TableService/Watch", Player, Compared).following(),
+    call!("InstrumentService/AddMarker", Host, Compared),
+    call!("InstrumentService/FollowMarkers", Host, Compared).following(),
+    call!("InstrumentService/AddSamples", Player, Compared).takes(MAX_MESSAGE_BYTES, 64, 768 * KIB),
+    call!("RoomService/GetRoom", Spectator, Compared),
+    call!("RoomService/ListRooms", Spectator, Compared).not_forwarded(),
+    call!("RoomService/JoinRoom", Player, Compared),
+    call!("RoomService/LeaveRoom", Player, Compared),
+    call!("RoomService/CreateRoom", Host, Refused).takes(MAX_MESSAGE_BYTES, 512, 768 * KIB),
+    call!("RoomService/CloseRoom", Host, Compared),
+    call!("RoomService/SetNextRoom", Player, Compared),
+    call!("StudyService/CreateStudy", Host, Refused).takes(
+        MAX_STUDY_MESSAGE_BYTES,
+        20_000,
+        8 * MIB,
     ),
-    call(
-        "/chefshat.v1.StudyService/AddStudyParticipants",
-        Host,
-        Refused,
-    )
-    .forwarded()
-    .takes(320 * KIB, 2_048, MIB),
-    call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused).forwarded(),
-    call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused)
-        .following()
-        .forwarded(),
-    call(
-        "/chefshat.v1.StudyService/RemoveStudyParticipant",
-        Host,
-        Refused,
-    )
-    .forwarded(),
-    call("/chefshat.v1.StudyService/CloseStudy", Host, Refused).forwarded(),
-    call("/chefshat.v1.StudyService/ExportStudy", Host, Refused)
-        .streaming()
-        .forwarded(),
-    call(
-        "/chefshat.v1.StudyService/DeleteStudyParticipant",
-        Host,
-        Refused,
-    )
-    .forwarded(),
-    call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused).forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/JoinStudy",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/OpenStudy",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/FollowParticipation",
-        Player,
-        Refused,
-    )
-    .following()
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/GiveConsent",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/AnswerQuestionnaire",
-        Player,
-        Refused,
-    )
-    .forwarded()
-    .takes(MAX_STUDY_MESSAGE_BYTES, 512, 3 * MIB),
-    call(
-        "/chefshat.v1.ParticipationService/SaveAnswers",
-        Player,
-        Refused,
-    )
-    .forwarded()
-    .takes(MAX_STUDY_MESSAGE_BYTES, 512, 3 * MIB),
-    call(
-        "/chefshat.v1.ParticipationService/ContinueStudy",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/RecordTraces",
-        Player,
-        Refused,
-    )
-    .forwarded()
-    .takes(192 * KIB, 1_024, MIB),
-    call(
-        "/chefshat.v1.ParticipationService/GetStudyPicture",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.ParticipationService/WithdrawFromStudy",
-        Player,
-        Refused,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/GetTournament",
-        Spectator,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/ListTournaments",
-        Spectator,
-        Compared,
+    call!("StudyService/GetStudy", Spectator, Refused),
+    call!("StudyService/ListStudies", Spectator, Refused)
+        .not_forwarded()
+        .takes(16 * KIB, 256, 256 * KIB),
+    call!("StudyService/AddStudyParticipants", Host, Refused).takes(320 * KIB, 2_048, MIB),
+    call!("StudyService/ListStudyLinks", Host, Refused),
+    call!("StudyService/FollowStudy", Spectator, Refused).following(),
+    call!("StudyService/RemoveStudyParticipant", Host, Refused),
+    call!("StudyService/CloseStudy", Host, Refused),
+    call!("StudyService/ExportStudy", Host, Refused).streaming(),
+    call!("StudyService/DeleteStudyParticipant", Host, Refused),
+    call!("StudyService/DeleteStudy", Host, Refused),
+    call!("ParticipationService/JoinStudy", Player, Refused),
+    call!("ParticipationService/OpenStudy", Player, Refused),
+    call!("ParticipationService/FollowParticipation", Player, Refused).following(),
+    call!("ParticipationService/GiveConsent", Player, Refused),
+    call!("ParticipationService/AnswerQuestionnaire", Player, Refused).takes(
+        MAX_STUDY_MESSAGE_BYTES,
+        512,
+        3 * MIB,
     ),
-    call(
-        "/chefshat.v1.TournamentService/FollowTournament",
-        Spectator,
-        Compared,
-    )
-    .following()
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/GetTournamentResults",
-        Spectator,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/ListTournamentGames",
-        Spectator,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/GetLeaderboard",
-        Spectator,
-        Refused,
+    call!("ParticipationService/SaveAnswers", Player, Refused).takes(
+        MAX_STUDY_MESSAGE_BYTES,
+        512,
+        3 * MIB,
     ),
-    call(
-        "/chefshat.v1.TournamentService/JoinTournament",
-        Player,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/CreateTournament",
-        Host,
-        Refused,
-    )
-    .forwarded()
-    .takes(MAX_MESSAGE_BYTES, 4_096, MIB),
-    call(
-        "/chefshat.v1.TournamentService/AddTableParticipant",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/GetPhysicalTable",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/StartTournament",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/CloseTournament",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/WithdrawParticipant",
-        Player,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/RemoveParticipant",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/ReplaceParticipant",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/PauseTournament",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/ResumeTournament",
-        Host,
-        Compared,
-    )
-    .forwarded(),
-    call(
-        "/chefshat.v1.TournamentService/PostponeGame",
-        Player,
-        Compared,
-    )
-    .forwarded(),
-    call("/chefshat.v1.TournamentService/CallGame", Host, Compared).forwarded(),
-    records("/chefshat.v1.RecordService/ListRecords"),
-    records("/chefshat.v1.RecordService/GetRecord")
-        .streaming()
-        .forwarded(),
-    records("/chefshat.v1.RecordService/StreamRecords").streaming(),
-    call("/chefshat.v1.RecordService/ImportRecord", Host, Refused)
+    call!("ParticipationService/ContinueStudy", Player, Refused),
+    call!("ParticipationService/RecordTraces", Player, Refused).takes(192 * KIB, 1_024, MIB),
+    call!("ParticipationService/GetStudyPicture", Player, Refused),
+    call!("ParticipationService/WithdrawFromStudy", Player, Refused),
+    call!("TournamentService/GetTournament", Spectator, Compared),
+    call!("TournamentService/ListTournaments", Spectator, Compared).not_forwarded(),
+    call!("TournamentService/FollowTournament", Spectator, Compared).following(),
+    call!(
+        "TournamentService/GetTournamentResults",
+        Spectator,
+        Compared
+    ),
+    call!("TournamentService/ListTournamentGames", Spectator, Compared),
+    call!("TournamentService/GetLeaderboard", Spectator, Refused).not_forwarded(),
+    call!("TournamentService/JoinTournament", Player, Compared),
+    call!("TournamentService/CreateTournament", Host, Refused).takes(MAX_MESSAGE_BYTES, 4_096, MIB),
+    call!("TournamentService/AddTableParticipant", Host, Compared),
+    call!("TournamentService/GetPhysicalTable", Host, Compared),
+    call!("TournamentService/StartTournament", Host, Compared),
+    call!("TournamentService/CloseTournament", Host, Compared),
+    call!("TournamentService/WithdrawParticipant", Player, Compared),
+    call!("TournamentService/RemoveParticipant", Host, Compared),
+    call!("TournamentService/ReplaceParticipant", Host, Compared),
+    call!("TournamentService/PauseTournament", Host, Compared),
+    call!("TournamentService/ResumeTournament", Host, Compared),
+    call!("TournamentService/PostponeGame", Player, Compared),
+    call!("TournamentService/CallGame", Host, Compared),
+    call!("RecordService/ListRecords", Spectator, Compared)
+        .reading_records()
+        .not_forwarded(),
+    call!("RecordService/GetRecord", Spectator, Compared)
+        .reading_records()
+        .streaming(),
+    call!("RecordService/StreamRecords", Spectator, Compared)
+        .reading_records()
+        .not_forwarded()
+        .streaming(),
+    call!("RecordService/ImportRecord", Host, Refused)
         .sending()
         .with_own_rate()
         .takes(MAX_MESSAGE_BYTES, 16_384, 6 * MIB),
-    call("/chefshat.v1.VectorService/Run", Player, Refused)
-        .sending()
-        .takes(MAX_VECTOR_MESSAGE_BYTES, 65_536, 9 * MIB),
-    call("/chefshat.v1.AnalysisService/Evaluate", Player, Compared)
+    call!("VectorService/Run", Player, Refused).sending().takes(
+        MAX_VECTOR_MESSAGE_BYTES,
+        65_536,
+        9 * MIB,
+    ),
+    call!("AnalysisService/Evaluate", Player, Compared)
         .streaming()
-        .takes(MAX_MESSAGE_BYTES, 8_192, 4 * MIB)
-        .forwarded(),
-    call(
-        "/chefshat.v1.AnalysisService/LegalActions",
-        Player,
-        Compared,
-    )
-    .forwarded(),
-    call("/chefshat.v1.AdminService/ListClients", Admin, Refused),
-    call("/chefshat.v1.AdminService/DisconnectClient", Admin, Refused),
-    call("/chefshat.v1.AdminService/CloseRoom", Admin, Refused).forwarded(),
-    call("/chefshat.v1.AdminService/CloseTournament", Admin, Refused).forwarded(),
-    call("/chefshat.v1.AdminService/GetStorage", Admin, Refused),
-    call("/chefshat.v1.AdminService/PruneRecords", Admin, Refused),
-    call(
-        "/chefshat.v1.AdminService/ExportParticipant",
-        Admin,
-        Refused,
-    )
-    .streaming(),
-    call(
-        "/chefshat.v1.AdminService/DeleteParticipant",
-        Admin,
-        Refused,
-    ),
-    call(
-        "/chefshat.v1.ServerService/GetServerInfo",
-        Anyone,
-        Unlimited,
-    ),
-    call(
-        "/chefshat.v1.ServerService/GetActionTable",
-        Spectator,
-        Unlimited,
-    ),
-    call("/chefshat.v1.ServerService/GetClock", Spectator, Compared).forwarded(),
-    call("/grpc.health.v1.Health/Check", Anyone, Unlimited),
-    call("/grpc.health.v1.Health/Watch", Anyone, Unlimited).streaming(),
+        .takes(MAX_MESSAGE_BYTES, 8_192, 4 * MIB),
+    call!("AnalysisService/LegalActions", Player, Compared),
+    call!("AdminService/ListClients", Admin, Refused).not_forwarded(),
+    call!("AdminService/DisconnectClient", Admin, Refused).not_forwarded(),
+    call!("AdminService/CloseRoom", Admin, Refused),
+    call!("AdminService/CloseTournament", Admin, Refused),
+    call!("AdminService/GetStorage", Admin, Refused).not_forwarded(),
+    call!("AdminService/PruneRecords", Admin, Refused).not_forwarded(),
+    call!("AdminService/ExportParticipant", Admin, Refused)
+        .not_forwarded()
+        .streaming(),
+    call!("AdminService/DeleteParticipant", Admin, Refused).not_forwarded(),
+    call!("ServerService/GetServerInfo", Anyone, Unlimited).not_forwarded(),
+    call!("ServerService/GetActionTable", Spectator, Unlimited).not_forwarded(),
+    call!("ServerService/GetClock", Spectator, Compared),
+    call("/grpc.health.v1.Health/Check", Anyone, Unlimited).not_forwarded(),
+    call("/grpc.health.v1.Health/Watch", Anyone, Unlimited)
+        .not_forwarded()
+        .streaming(),
     call(
         "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
         Anyone,
@@ -524,8 +331,8 @@ const CALLS_OF_NODES: &[Call] = &[
         .sending()
         .takes(MAX_PEER_REQUEST_BYTES, 80_000, 9 * MIB),
     call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).sending(),
-    call("/chefshat.peer.v1.PeerService/Reach", Anyone, Unlimited),
-    call("/chefshat.peer.v1.PeerService/Identify", Anyone, Unlimited),
+    call("/chefshat.peer.v1.PeerService/Reach", Anyone, Unlimited).not_forwarded(),
+    call("/chefshat.peer.v1.PeerService/Identify", Anyone, Unlimited).not_forwarded(),
 ];
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::{Arc, RwLock};
 use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
@@ -20,6 +20,7 @@ use super::secrets::Secrets;
 use super::token::{AccessToken, TokenId};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::file_watch::FileWatch;
+use chefshat_base::lock::Lock;
 
 /// How often the tokens file is looked at, and expired tokens are searched for.
 const INTERVAL: Duration = Duration::from_secs(1);
@@ -147,12 +148,12 @@ struct Known {
 #[derive(Debug)]
 struct Followed {
     file: TokenFile,
-    watch: Mutex<FileWatch>,
+    watch: Lock<FileWatch>,
 }
 
 impl Followed {
     fn new(file: TokenFile) -> Self {
-        let watch = Mutex::new(FileWatch::of([file.path()]));
+        let watch = Lock::new(FileWatch::of([file.path()]));
         Self { file, watch }
     }
 }
@@ -168,7 +169,7 @@ pub struct Access {
     file: Option<Followed>,
     known: RwLock<HashMap<TokenId, Known>>,
     /// The hashes of tokens that the file did not have when it was last looked at for them.
-    unknown: Mutex<HashSet<[u8; 32]>>,
+    unknown: Lock<HashSet<[u8; 32]>>,
     /// Number of such looks that have begun.
     looks_begun: AtomicU64,
     /// The number of the last one that has ended, and when it began. Held while looking.
@@ -202,7 +203,7 @@ impl Access {
             records: settings.records,
             file,
             known: RwLock::default(),
-            unknown: Mutex::default(),
+            unknown: Lock::default(),
             looks_begun: AtomicU64::default(),
             looked: tokio::sync::Mutex::default(),
             #[cfg(test)]
@@ -279,7 +280,7 @@ impl Access {
             let hash = token.hash();
             let known = self.known();
             let is_known = (known.get(&token.id)).is_some_and(|known| known.token.hash.is(&hash));
-            !is_known && !self.unknown().contains(hash.bytes())
+            !is_known && !self.unknown.lock().contains(hash.bytes())
         })
     }
 
@@ -301,7 +302,7 @@ impl Access {
         if self.may_be_new(authorization)
             && let Some(token) = authorization.and_then(bearer)
         {
-            let mut unknown = self.unknown();
+            let mut unknown = self.unknown.lock();
             if unknown.len() >= MAX_UNKNOWN {
                 unknown.clear();
             }
@@ -384,7 +385,7 @@ impl Access {
         };
         #[cfg(test)]
         self.looks.fetch_add(1, Ordering::Relaxed);
-        let mut watch = (watch.lock()).expect("no code that holds this lock can panic");
+        let mut watch = watch.lock();
         let read = watch.read_changed(|| {
             // An editor may have removed it before it writes a new one, and a server may not forget
             // its tokens because a disk is not mounted.
@@ -419,7 +420,7 @@ impl Access {
             known.insert(token.id, Known { token, ended });
         }
         drop(known);
-        self.unknown().clear();
+        self.unknown.lock().clear();
         for (id, gone) in before {
             info!(token = %id, "a token was revoked");
             gone.ended.cancel();
@@ -446,10 +447,6 @@ impl Access {
                 it.ended.cancel();
             }
         }
-    }
-
-    fn unknown(&self) -> std::sync::MutexGuard<'_, HashSet<[u8; 32]>> {
-        (self.unknown.lock()).expect("no code that holds this lock can panic")
     }
 
     fn known(&self) -> std::sync::RwLockReadGuard<'_, HashMap<TokenId, Known>> {

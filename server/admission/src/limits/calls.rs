@@ -1,11 +1,12 @@
 //! What the calls of one caller may take: how many calls, how many answers that it has not read,
 //! how many streams, and how many wrong join codes.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::fair_semaphore::{MAX_WAIT, within};
 use super::{Decoding, FairSemaphore, Key, Permit, Rate, Refused, Shares};
+use chefshat_base::lock::Lock;
 
 /// Most streams of all callers, except those that have limits of their own.
 pub const MAX_STREAMS: usize = 20_000;
@@ -98,16 +99,16 @@ impl Drop for Admitted {
 /// The place of a call among those that are executed. The call finds it in the extensions of its
 /// request.
 #[derive(Debug, Clone)]
-pub struct Executing(Arc<Mutex<Option<Permit>>>);
+pub struct Executing(Arc<Lock<Option<Permit>>>);
 
 impl Executing {
     fn new(place: Permit) -> Self {
-        Self(Arc::new(Mutex::new(Some(place))))
+        Self(Arc::new(Lock::new(Some(place))))
     }
 
     /// Lets others be executed, because this call only waits from now on.
     pub fn give_back(&self) {
-        let place = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let place = self.0.lock().take();
         drop(place);
     }
 }

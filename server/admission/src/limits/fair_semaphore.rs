@@ -3,12 +3,13 @@
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::oneshot;
 
 use super::{Key, Shares};
+use chefshat_base::lock::Lock;
 
 /// Longest time that a call waits until its caller may make another one.
 pub const MAX_WAIT: Duration = Duration::from_secs(5);
@@ -18,7 +19,7 @@ pub const MAX_WAIT: Duration = Duration::from_secs(5);
 pub struct FairSemaphore {
     total: usize,
     shares: Shares,
-    state: Mutex<State>,
+    state: Lock<State>,
 }
 
 #[derive(Debug, Default)]
@@ -60,7 +61,7 @@ impl FairSemaphore {
         Arc::new(Self {
             total,
             shares,
-            state: Mutex::default(),
+            state: Lock::default(),
         })
     }
 
@@ -76,7 +77,7 @@ impl FairSemaphore {
 
     /// Number of taken permits.
     pub fn taken(&self) -> usize {
-        self.lock().taken
+        self.state.lock().taken
     }
 
     /// Takes a permit if one is free, the caller's share is not used up, and the caller does not
@@ -93,12 +94,12 @@ impl FairSemaphore {
 
     /// Takes this number of permits in the same way.
     pub fn take_many_anyway(self: &Arc<Self>, key: Key, count: usize) -> Permit {
-        self.hold(&mut self.lock(), key, count)
+        self.hold(&mut self.state.lock(), key, count)
     }
 
     /// Takes this number of permits, or none.
     pub fn try_take_many(self: &Arc<Self>, key: Key, count: usize) -> Option<Permit> {
-        self.take_now(&mut self.lock(), key, count)
+        self.take_now(&mut self.state.lock(), key, count)
     }
 
     /// Waits for a permit.
@@ -110,7 +111,7 @@ impl FairSemaphore {
     pub async fn take_many(self: &Arc<Self>, key: Key, count: usize) -> Permit {
         let count = count.min(self.share_of(key));
         let (granted, _waiting) = {
-            let mut state = self.lock();
+            let mut state = self.state.lock();
             if let Some(held) = self.take_now(&mut state, key, count) {
                 return held;
             }
@@ -193,7 +194,7 @@ impl FairSemaphore {
     }
 
     fn free(self: &Arc<Self>, key: Key, count: usize) {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         state.taken -= count;
         if let Some(caller) = state.callers.get_mut(&key) {
             caller.taken -= count;
@@ -210,10 +211,6 @@ impl FairSemaphore {
         state.forget_idle(key);
         drop(state);
         send(granted);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        (self.state.lock()).expect("no code that holds this lock can panic")
     }
 }
 
@@ -258,7 +255,7 @@ struct Waiting<'a> {
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        let mut state = self.places.lock();
+        let mut state = self.places.state.lock();
         let Some(caller) = state.callers.get_mut(&self.key) else {
             return;
         };
@@ -329,7 +326,7 @@ mod tests {
         taken.pop();
         assert!(places.try_take(network(1, 30)).is_some());
         drop(taken);
-        assert_eq!(places.lock().sites.len(), 1);
+        assert_eq!(places.state.lock().sites.len(), 1);
     }
 
     #[test]
@@ -358,9 +355,9 @@ mod tests {
         }
         assert!(places.try_take(key(1)).is_none());
         drop(waiting);
-        assert!(places.lock().turns.is_empty());
+        assert!(places.state.lock().turns.is_empty());
         drop(held);
-        assert!(places.lock().callers.is_empty());
+        assert!(places.state.lock().callers.is_empty());
         assert!(places.take(key(1)).now_or_never().is_some());
     }
 
@@ -393,7 +390,7 @@ mod tests {
         drop(places.try_take(key(4)).expect("free"));
         drop((first, second));
         assert_eq!(places.taken(), 0);
-        assert!(places.lock().callers.is_empty());
+        assert!(places.state.lock().callers.is_empty());
     }
 
     #[tokio::test]

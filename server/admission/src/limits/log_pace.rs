@@ -1,9 +1,9 @@
 //! How many lines of the log clients may cause by being refused, so that nobody fills the disk with
 //! them.
 
-use std::sync::Mutex;
 use std::time::Duration;
 
+use chefshat_base::lock::Lock;
 use tokio::time::Instant;
 
 /// The time for which lines are counted.
@@ -14,7 +14,7 @@ const INTERVAL: Duration = Duration::from_secs(60);
 pub struct LogPace {
     most: u32,
     /// When the current interval began, and the lines since.
-    written: Mutex<Option<(Instant, u32)>>,
+    written: Lock<Option<(Instant, u32)>>,
 }
 
 impl LogPace {
@@ -22,14 +22,14 @@ impl LogPace {
     pub fn new(most: u32) -> Self {
         Self {
             most,
-            written: Mutex::default(),
+            written: Lock::default(),
         }
     }
 
     /// Whether one more line may be written. Counts it.
     pub fn admits(&self) -> bool {
         let now = Instant::now();
-        let mut written = (self.written.lock()).expect("nothing panics under this lock");
+        let mut written = self.written.lock();
         let (since, lines) = (*written)
             .filter(|(since, _)| now < *since + INTERVAL)
             .unwrap_or((now, 0));

@@ -2,12 +2,12 @@
 //! may be overdrawn, because the cost of a call is known only afterwards.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use tokio::time::Instant;
 
 use super::Key;
+use chefshat_base::lock::Lock;
 
 /// Fewest buckets of which full ones, which say nothing, are removed.
 const MANY: usize = 4_096;
@@ -17,7 +17,7 @@ const MANY: usize = 4_096;
 pub struct Rate {
     per_second: u64,
     burst: u64,
-    buckets: Mutex<Buckets>,
+    buckets: Lock<Buckets>,
 }
 
 #[derive(Debug)]
@@ -39,7 +39,7 @@ impl Rate {
         Self {
             per_second: per_second.max(1),
             burst,
-            buckets: Mutex::new(Buckets {
+            buckets: Lock::new(Buckets {
                 by_key: HashMap::new(),
                 many: MANY,
             }),
@@ -54,13 +54,13 @@ impl Rate {
     /// Whether a caller's bucket is full: it has taken nothing for a while.
     pub fn is_full(&self, key: Key) -> bool {
         let now = Instant::now();
-        (self.lock().by_key.get(&key)).is_none_or(|bucket| bucket.full_at <= now)
+        (self.buckets.lock().by_key.get(&key)).is_none_or(|bucket| bucket.full_at <= now)
     }
 
     /// How long to wait until a caller's bucket is not empty.
     pub fn wait(&self, key: Key) -> Duration {
         let now = Instant::now();
-        let Some(bucket) = self.lock().by_key.get(&key).copied() else {
+        let Some(bucket) = self.buckets.lock().by_key.get(&key).copied() else {
             return Duration::ZERO;
         };
         (bucket.full_at.saturating_duration_since(now)).saturating_sub(self.time(self.burst))
@@ -73,7 +73,7 @@ impl Rate {
             return;
         }
         let now = Instant::now();
-        let mut buckets = self.lock();
+        let mut buckets = self.buckets.lock();
         if buckets.by_key.len() >= buckets.many {
             buckets.by_key.retain(|_, bucket| bucket.full_at > now);
             buckets.many = MANY.max(2 * buckets.by_key.len());
@@ -85,10 +85,6 @@ impl Rate {
     /// The time in which a bucket fills by `cost`.
     fn time(&self, cost: u64) -> Duration {
         Duration::from_nanos(cost.saturating_mul(1_000_000_000) / self.per_second)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Buckets> {
-        (self.buckets.lock()).expect("no code that holds this lock can panic")
     }
 }
 

@@ -4,13 +4,14 @@
 //! out after it has waited. What is computed, and on which threads, is not known here.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::{Key, Payer};
+use chefshat_base::lock::Lock;
 
 /// Processor time after which a computation lets others continue.
 pub const SLICE: Duration = Duration::from_millis(20);
@@ -26,7 +27,7 @@ const MIN_RETRY: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct WorkQueue {
     threads: usize,
-    state: Mutex<State>,
+    state: Lock<State>,
 }
 
 #[derive(Debug)]
@@ -84,7 +85,7 @@ impl WorkQueue {
     pub fn new(threads: usize) -> Arc<Self> {
         Arc::new(Self {
             threads,
-            state: Mutex::new(State {
+            state: Lock::new(State {
                 jobs: BTreeMap::new(),
                 next: 0,
                 free: threads,
@@ -114,7 +115,7 @@ impl WorkQueue {
     ) -> Result<Queued, Duration> {
         let now = Instant::now();
         let work = due.map_or(work, |due| work.min(due.saturating_duration_since(now)));
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         let job = Job {
             payer,
             left: work,
@@ -227,7 +228,7 @@ impl WorkQueue {
 
     /// Adds one that waits for a slice.
     fn wait(self: &Arc<Self>, payer: Payer, sender: oneshot::Sender<Slice>) {
-        let mut state = self.lock();
+        let mut state = self.state.lock();
         state.waiting.push_back((payer, sender));
         self.grant(state);
     }
@@ -263,10 +264,6 @@ impl WorkQueue {
             let _ = sender.send(slice);
         }
     }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        (self.state.lock()).expect("no code that holds this lock can panic")
-    }
 }
 
 impl Queued {
@@ -280,7 +277,7 @@ impl Queued {
 
     /// A slice has ended that took `own` of processor time while `passed` went by.
     pub fn computed(&self, own: Duration, passed: Duration) {
-        let mut state = self.queue.lock();
+        let mut state = self.queue.state.lock();
         if let Some(job) = state.jobs.get_mut(&self.number) {
             job.left = job.left.saturating_sub(own);
         }
@@ -293,7 +290,7 @@ impl Queued {
 
 impl Drop for Queued {
     fn drop(&mut self) {
-        let mut state = self.queue.lock();
+        let mut state = self.queue.state.lock();
         state.jobs.remove(&self.number);
         for key in self.payer.keys() {
             if state
@@ -313,7 +310,7 @@ impl Drop for Queued {
 
 impl Drop for Slice {
     fn drop(&mut self) {
-        let mut state = self.queue.lock();
+        let mut state = self.queue.state.lock();
         state.free += 1;
         for key in self.payer.keys() {
             if let Some(slices) = state.running.get_mut(&key) {
@@ -406,7 +403,7 @@ mod tests {
         let spread = ends[8].duration_since(ends[0]);
         assert!(spread <= 9 * SLICE, "{spread:?}");
         assert_eq!(ends[8].duration_since(begun), ms(19_000));
-        assert!(queue.lock().jobs.is_empty() && queue.lock().running.is_empty());
+        assert!(queue.state.lock().jobs.is_empty() && queue.state.lock().running.is_empty());
     }
 
     #[tokio::test(start_paused = true)]
@@ -431,9 +428,9 @@ mod tests {
         assert_eq!(eight.iter().filter(|queued| queued.is_ok()).count(), 2);
         let lone = queue.admit(with_token(2, 8), second, due);
         lone.expect("half of the thread");
-        assert!(queue.lock().running.is_empty());
+        assert!(queue.state.lock().running.is_empty());
         drop(eight);
-        assert!(queue.lock().turns.is_empty());
+        assert!(queue.state.lock().turns.is_empty());
     }
 
     #[tokio::test(start_paused = true)]

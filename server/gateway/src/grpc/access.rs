@@ -14,12 +14,13 @@ use http_body::Frame;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::body::Body;
 use tonic::{Code, Status};
-use tower::{Layer, Service};
+use tower::Service;
 use tracing::info;
 
 use super::limits::refuse;
 use super::status::{shutting_down, status};
 use crate::connections::peer_address;
+use crate::front::{Front, InFront, take_ready};
 use chefshat_admission::access::{
     Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
 };
@@ -41,34 +42,14 @@ pub struct AccessLayer {
 
 impl AccessLayer {
     /// Creates a layer that asks `access`. Refusals count as calls in `limits`.
-    pub fn new(access: Arc<Access>, limits: Arc<CallLimits>) -> Self {
-        Self {
+    pub fn new(access: Arc<Access>, limits: Arc<CallLimits>) -> InFront<Self> {
+        InFront(Self {
             access,
             limits,
             logged: Arc::new(LogPace::new(LOGGED)),
-        }
+        })
     }
-}
 
-impl<S> Layer<S> for AccessLayer {
-    type Service = WithAccess<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithAccess {
-            layer: self.clone(),
-            services,
-        }
-    }
-}
-
-/// The services with the decision in front of them.
-#[derive(Debug, Clone)]
-pub struct WithAccess<S> {
-    layer: AccessLayer,
-    services: S,
-}
-
-impl<S> WithAccess<S> {
     /// Decides about a request. Also returns whether its call is a stream.
     fn decide<B>(&self, request: &Request<B>) -> Result<(Granted, bool), Status> {
         let address = peer_address(request.extensions());
@@ -85,9 +66,9 @@ impl<S> WithAccess<S> {
             let ended = None;
             return Ok((Granted { caller, ended }, false));
         };
-        let checked = (self.layer.access).check(call, authorization(request), address);
+        let checked = (self.access).check(call, authorization(request), address);
         let mut granted = checked.map_err(|refusal| {
-            if self.layer.logged.admits() {
+            if self.logged.admits() {
                 let address = address.map(tracing::field::display);
                 info!(call = path, address, ?refusal, "a call was refused");
             }
@@ -98,21 +79,22 @@ impl<S> WithAccess<S> {
             Secrets::parse(secrets.map(|value| value.as_bytes())).map_err(secrets_refused)?;
         Ok((granted, call.streams))
     }
-}
 
-impl<S> WithAccess<S>
-where
-    S: Service<Request<Body>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    /// Answers a request or refuses it.
-    fn answer(&mut self, mut request: Request<Body>) -> Answering<S::Future, S::Error> {
+    /// Passes a request on or refuses it.
+    fn pass<S>(
+        &self,
+        services: &mut S,
+        mut request: Request<Body>,
+    ) -> Answering<S::Future, S::Error>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Future: Send + 'static,
+        S::Error: Send + 'static,
+    {
         let (granted, streams) = match self.decide(&request) {
             Ok(decided) => decided,
             Err(status) => {
-                let limits = &self.layer.limits;
-                return Either::Right(refuse(limits, request.extensions(), status));
+                return Either::Right(refuse(&self.limits, request.extensions(), status));
             }
         };
         // They have served: nothing behind this layer needs them, or could log them.
@@ -120,13 +102,13 @@ where
         request.headers_mut().remove(SECRET_HEADER);
         request.extensions_mut().insert(granted.caller);
         match granted.ended {
-            None => Either::Left(self.services.call(request)),
+            None => Either::Left(services.call(request)),
             Some(ended) => {
                 if streams {
                     // A client that does not read its answers keeps the answering side from ending.
                     request = request.map(|body| EndingBody::of(body, &ended, Side::Request));
                 }
-                let answering = self.services.call(request);
+                let answering = services.call(request);
                 Either::Right(Box::pin(until_ended(answering, ended)))
             }
         }
@@ -136,11 +118,11 @@ where
     /// just been created.
     fn place_to_look(&self, request: &Request<Body>) -> Option<Permit> {
         let authorization = authorization(request);
-        if !self.layer.access.may_be_new(authorization) {
+        if !self.access.may_be_new(authorization) {
             return None;
         }
         let address = peer_address(request.extensions());
-        self.layer.limits.place_to_wait(Key::of_address(address))
+        self.limits.place_to_wait(Key::of_address(address))
     }
 }
 
@@ -153,32 +135,24 @@ fn authorization<B>(request: &Request<B>) -> Option<&[u8]> {
 /// An answer of the services, or something that takes longer or refuses.
 type Answering<F, E> = Either<F, BoxFuture<'static, Result<Response<Body>, E>>>;
 
-impl<S> Service<Request<Body>> for WithAccess<S>
+impl<S> Front<S, Body> for AccessLayer
 where
     S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Answering<S::Future, S::Error>;
+    type Answering = Answering<S::Future, S::Error>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<Body>) -> Self::Future {
+    fn answer(&self, services: &mut S, request: Request<Body>) -> Self::Answering {
         let Some(waiting) = self.place_to_look(&request) else {
-            return self.answer(request);
+            return self.pass(services, request);
         };
-        // The clone that is ready serves this call.
-        let clone = self.clone();
-        let mut this = std::mem::replace(self, clone);
+        let (this, mut services) = (self.clone(), take_ready(services));
         Either::Right(Box::pin(async move {
             let value = authorization(&request).map(<[u8]>::to_vec);
-            this.layer.access.look_again(value.as_deref()).await;
+            this.access.look_again(value.as_deref()).await;
             drop(waiting);
-            this.answer(request).await
+            this.pass(&mut services, request).await
         }))
     }
 }
@@ -281,6 +255,12 @@ impl<F: Fn() -> Status + Unpin> HttpBody for EndingBody<F> {
     }
 }
 
+/// The caller of a request, and its message.
+pub(super) fn opened<M>(request: tonic::Request<M>) -> (Caller, M) {
+    let caller = Caller::of(request.extensions());
+    (caller, request.into_inner())
+}
+
 /// Checks that the scope of a caller includes something.
 pub(super) fn check(caller: &Caller, reaches: impl FnOnce(&Caller) -> bool) -> Result<(), Status> {
     match caller.scope {
@@ -346,7 +326,7 @@ mod tests {
     use futures::{FutureExt as _, stream};
     use http_body_util::{BodyExt as _, StreamBody};
     use tokio::sync::oneshot;
-    use tower::service_fn;
+    use tower::{Layer as _, service_fn};
 
     use super::*;
     use chefshat_admission::access::{AccessSettings, NewToken, Role, TokenFile};

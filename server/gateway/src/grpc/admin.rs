@@ -7,7 +7,6 @@ use chefshat_proto::v1::{
     self, admin_service_client::AdminServiceClient, admin_service_server::AdminService,
     study_service_client::StudyServiceClient,
 };
-use chefshat_record::convert::FieldProblem;
 use chefshat_record::pseudonym::{Named, Pseudonym, is_fingerprint};
 use futures::future::join_all;
 use tokio::sync::mpsc;
@@ -23,12 +22,13 @@ use super::limits::charged;
 use super::lookup::Lookup;
 use super::pages;
 use super::status::{
-    Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
+    Refusal, invalid, owner_unreachable, room_unknown, shutting_down, status, store_failed,
     tournament_unknown,
 };
 use super::tournaments;
 use crate::connections::{Client, Connections};
 use chefshat_admission::limits::Key;
+use chefshat_base::clock::millis;
 use chefshat_base::tasks::short;
 use chefshat_hosting::cluster::{FoundBy, Location};
 use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
@@ -84,11 +84,7 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::ListClientsResponse>, Status> {
         let request = request.into_inner();
         let after = pages::last_shown(&request.page_token)?.unwrap_or_default();
-        let size = match request.page_size {
-            0 => CLIENTS_PER_PAGE,
-            size => size.min(CLIENTS_PER_PAGE),
-        };
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let size = pages::size_within(request.page_size, CLIENTS_PER_PAGE, CLIENTS_PER_PAGE);
         let clients = self.connections.clients();
         let mut later = clients.iter().filter(|client| client.id > after);
         let page: Vec<_> = later.by_ref().take(size).collect();
@@ -178,8 +174,8 @@ impl AdminService for AdminCalls {
             newest: Some(request.keep).filter(|count| *count > 0),
         };
         if keep == Keep::default() {
-            let problem = FieldProblem::new("keep", "set ended_before_ms, keep or both");
-            return Err(field("PRUNE_REFUSED", &problem));
+            let problem = "set ended_before_ms, keep or both";
+            return Err(invalid("PRUNE_REFUSED", "keep", problem));
         }
         let pruned = self.retention.prune(keep).await.map_err(failed)?;
         Ok(Response::new(v1::PruneRecordsResponse {
@@ -376,7 +372,7 @@ impl StudiesElsewhere for OtherNodes {
 
 /// A participant's name from a request. Empty seats have an empty one.
 fn given(name: String, fingerprint: Option<String>) -> Result<Named, Status> {
-    let refused = |name, what| Err(field("NAME_REFUSED", &FieldProblem::new(name, what)));
+    let refused = |name, what| Err(invalid("NAME_REFUSED", name, what));
     if name.is_empty() {
         return refused("name", "give the exact name the participant played under");
     }
@@ -413,7 +409,7 @@ fn described(client: &Client) -> v1::ConnectedClient {
         client_id: client.id,
         address: (client.address).map_or_else(String::new, |it| it.to_string()),
         token_id: client.token().map_or_else(String::new, |id| id.to_string()),
-        connected_at_ms: u64::try_from(since.as_millis()).unwrap_or(u64::MAX),
+        connected_at_ms: millis(since),
         calls: client.calls(),
         streams: client.streams() as u64,
     }

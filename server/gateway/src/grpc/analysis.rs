@@ -12,7 +12,7 @@ use chefshat_proto::v1::{
 };
 use chefshat_record::branch::{Branch, BranchError, branch_of};
 use chefshat_record::convert::{
-    FieldProblem, decision_kind, rules_from_proto, seat_number, situation_from_proto,
+    decision_kind, rules_from_proto, seat_number, situation_from_proto,
 };
 use chefshat_search::{
     Allocation, Estimate, Evaluation, Knowledge, KnowledgeError, LikelyHands, Method, OwnTime,
@@ -27,7 +27,7 @@ use tonic::{Request, Response, Status};
 use super::deadline::deadline;
 use super::limits::make_way;
 use super::recorded::Recorded;
-use super::status::{Refusal, field, internal, shutting_down};
+use super::status::{Refusal, field, internal, invalid, shutting_down};
 use crate::connections::STALLED_LIMIT;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Payer, Queued, Refused, SLICE, WorkQueue};
@@ -416,7 +416,7 @@ fn situation_knowledge(situation: &v1::Situation) -> Result<Knowledge, Status> {
 }
 
 fn refused(name: &'static str, words: impl Into<String>) -> Status {
-    field("ANALYSIS_REFUSED", &FieldProblem::new(name, words))
+    invalid("ANALYSIS_REFUSED", name, words)
 }
 
 /// The refusal of an analysis that could not end by the deadline of its client.

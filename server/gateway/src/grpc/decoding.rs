@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 use std::pin::Pin;
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock};
 use std::task::{Context, Poll, ready};
 
 use axum::body::HttpBody;
@@ -18,15 +18,17 @@ use http_body::Frame;
 use tokio::time::{Instant, Sleep, sleep_until};
 use tonic::body::Body;
 use tonic::{Code, Status};
-use tower::{Layer, Service};
+use tower::Service;
 
 use super::limits::charged;
 use super::status::{Refusal, is_elsewhere, status};
+use crate::front::{Front, InFront};
 use chefshat_admission::access::{Call, MessageLimits};
 use chefshat_admission::limits::{
     CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MAX_FREE_DECODED, MESSAGE_TIMEOUT, Permit,
     Refused, SMALL_DECODED, SMALL_MESSAGE,
 };
+use chefshat_base::lock::Lock;
 use chefshat_wire::encoded::peer;
 
 /// Bytes before each message: a flag and its length.
@@ -106,49 +108,25 @@ pub struct DecodingLayer {
 
 impl DecodingLayer {
     /// Creates a layer that takes memory from `limits`.
-    pub fn new(limits: Arc<CallLimits>) -> Self {
-        Self { limits }
+    pub fn new(limits: Arc<CallLimits>) -> InFront<Self> {
+        InFront(Self { limits })
     }
-}
-
-impl<S> Layer<S> for DecodingLayer {
-    type Service = WithDecoding<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithDecoding {
-            limits: Arc::clone(&self.limits),
-            services,
-        }
-    }
-}
-
-/// The services with the costs of messages in front of them.
-#[derive(Debug, Clone)]
-pub struct WithDecoding<S> {
-    limits: Arc<CallLimits>,
-    services: S,
 }
 
 /// The permit of the message that a call decodes or executes.
-type HeldPermit = Arc<Mutex<Option<Permit>>>;
+type HeldPermit = Arc<Lock<Option<Permit>>>;
 
-impl<S> Service<Request<Body>> for WithDecoding<S>
+impl<S> Front<S, Body> for DecodingLayer
 where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+    type Answering = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<Body>) -> Self::Future {
+    fn answer(&self, services: &mut S, request: Request<Body>) -> Self::Answering {
         let Some(call) = Call::find(request.uri().path()) else {
-            return Either::Left(self.services.call(request));
+            return Either::Left(services.call(request));
         };
         let permit = HeldPermit::default();
         let messages = Messages {
@@ -163,8 +141,7 @@ where
             begun: 0,
             until: None,
         };
-        let answering =
-            (self.services).call(request.map(|body| Body::new(Costed { body, messages })));
+        let answering = services.call(request.map(|body| Body::new(Costed { body, messages })));
         if call.sends_many {
             return Either::Left(answering);
         }
@@ -192,7 +169,7 @@ fn memory_of(limits: &CallLimits, plays: bool) -> &Decoding {
 }
 
 fn take(permit: &HeldPermit) -> Option<Permit> {
-    (permit.lock().expect("nothing panics under this lock")).take()
+    permit.lock().take()
 }
 
 /// The body of a request, whose messages are costed one by one. Each leaves it whole.
@@ -305,7 +282,7 @@ impl Messages {
                     let held = ready!(permit.as_mut().poll(context));
                     let held = held.map_err(|refused| Status::from(Refusal::from(refused)))?;
                     let message = std::mem::take(message);
-                    *self.permit.lock().expect("nothing panics under this lock") = Some(held);
+                    *self.permit.lock() = Some(held);
                     self.state = State::Next;
                     return Poll::Ready(Ok(Step::Pass(message)));
                 }
@@ -529,16 +506,18 @@ mod tests {
     use chefshat_proto::cost::{Filling, Method};
     use chefshat_proto::v1;
     use futures::{FutureExt as _, StreamExt as _, stream};
-    use http_body_util::{BodyExt as _, StreamBody};
+    use http_body_util::{BodyExt as _, Full, StreamBody};
     use prost::Message as _;
     use tonic_types::StatusExt as _;
-    use tower::service_fn;
+    use tower::{Layer as _, service_fn};
 
     use super::*;
     use chefshat_admission::access::CALLS;
     use chefshat_admission::limits::Shares;
     use chefshat_admission::limits::calls::{CALLS_AT_ONCE, CALLS_PER_SECOND};
 
+    const PLAY: &str = "/chefshat.v1.PlayService/Play";
+    const CREATE_STUDY: &str = "/chefshat.v1.StudyService/CreateStudy";
     /// Longest message that is decoded here, bytes.
     const READ: usize = 16 * 1024;
 
@@ -665,8 +644,21 @@ mod tests {
         [&[0], length.as_slice(), message].concat()
     }
 
+    /// 700 commands in one message.
+    fn commands() -> Vec<u8> {
+        let play = v1::PlayRequest {
+            commands: vec![v1::SeatCommand::default(); 700],
+        };
+        framed(&play.encode_to_vec())
+    }
+
     fn request(path: &str, body: Body) -> Request<Body> {
         Request::post(path).body(body).expect("a request")
+    }
+
+    /// A call whose messages have all arrived.
+    fn whole(path: &str, messages: Vec<u8>) -> Request<Body> {
+        request(path, Body::new(Full::new(Bytes::from(messages))))
     }
 
     /// What a service receives of a body in these parts.
@@ -685,34 +677,22 @@ mod tests {
         let body = Body::new(StreamBody::new(parts));
         let limits = limits();
         let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service);
-        services
-            .call(request(path, body))
-            .await
-            .expect("infallible");
+        let answer = services.call(request(path, body)).await;
+        answer.expect("infallible");
         assert_eq!(limits.decoding().taken() + limits.playing().taken(), 0);
         receiver.await.expect("read")
     }
 
     #[tokio::test]
     async fn messages_pass_unchanged_however_they_are_cut() {
-        let play = v1::PlayRequest {
-            commands: vec![v1::SeatCommand::default(); 700],
-        };
-        let small = framed(&v1::PlayRequest::default().encode_to_vec());
-        let bytes = [
-            framed(&play.encode_to_vec()),
-            small.clone(),
-            framed(&play.encode_to_vec()),
-            small,
-        ]
-        .concat();
+        let bytes = [commands(), framed(&[])].concat().repeat(2);
         for size in [1, 3, 7, 1_000, 100_000] {
             let parts = bytes.chunks(size).map(<[u8]>::to_vec).collect();
-            let read = received("/chefshat.v1.PlayService/Play", parts).await;
+            let read = received(PLAY, parts).await;
             assert_eq!(read.expect("legal"), bytes, "in parts of {size} bytes");
         }
         // A message that breaks off reaches the decoder, which refuses it.
-        let read = received("/chefshat.v1.PlayService/Play", vec![bytes[..9].to_vec()]).await;
+        let read = received(PLAY, vec![bytes[..9].to_vec()]).await;
         assert_eq!(read.expect("its beginning"), &bytes[..9]);
     }
 
@@ -723,9 +703,8 @@ mod tests {
             let info = status.get_details_error_info().expect("a reason");
             assert_eq!(info.reason, reason, "{status}");
         };
-        let study = "/chefshat.v1.StudyService/CreateStudy";
         // Its first 5 bytes are enough.
-        check(study, vec![0, 0, 0x20, 0, 0], "MESSAGE_TOO_LARGE").await;
+        check(CREATE_STUDY, vec![0, 0, 0x20, 0, 0], "MESSAGE_TOO_LARGE").await;
         // A million bytes of empty factors.
         let factors = v1::StudySettings {
             factors: vec![v1::StudyFactor::default(); 500_000],
@@ -735,10 +714,15 @@ mod tests {
             settings: Some(factors),
             ..v1::CreateStudyRequest::default()
         };
-        check(study, framed(&create.encode_to_vec()), "TOO_MANY_ELEMENTS").await;
-        check(study, framed(&[0xff]), "MESSAGE_MALFORMED").await;
+        check(
+            CREATE_STUDY,
+            framed(&create.encode_to_vec()),
+            "TOO_MANY_ELEMENTS",
+        )
+        .await;
+        check(CREATE_STUDY, framed(&[0xff]), "MESSAGE_MALFORMED").await;
         let twice = framed(&[]).repeat(2);
-        check(study, twice, "MESSAGE_MALFORMED").await;
+        check(CREATE_STUDY, twice, "MESSAGE_MALFORMED").await;
     }
 
     /// A service that reads a request to its end.
@@ -796,7 +780,6 @@ mod tests {
         let limits = limits();
         let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
         let unary = "/chefshat.v1.RoomService/GetRoom";
-        let stream = "/chefshat.v1.PlayService/Play";
         let whole = framed(&[]);
         for (path, sent) in [
             (unary, Vec::new()),
@@ -804,8 +787,8 @@ mod tests {
             (unary, vec![0, 0, 0, 0, 9, 1]),
             // Its message has arrived, and its end has not.
             (unary, whole.clone()),
-            (stream, vec![0, 0]),
-            (stream, [whole.as_slice(), &[0, 0, 0, 0, 9, 1]].concat()),
+            (PLAY, vec![0, 0]),
+            (PLAY, [whole.as_slice(), &[0, 0, 0, 0, 9, 1]].concat()),
         ] {
             let begun = Instant::now();
             let answer = services.call(request(path, stalled(sent.clone()))).await;
@@ -815,7 +798,7 @@ mod tests {
             assert_eq!(begun.elapsed(), MESSAGE_TIMEOUT, "{path} {sent:?}");
         }
         // A stream is silent as long as it likes between its messages.
-        let silent = services.call(request(stream, stalled(whole)));
+        let silent = services.call(request(PLAY, stalled(whole)));
         let day = Duration::from_secs(24 * 60 * 60);
         tokio::time::timeout(day, silent).await.expect_err("silent");
     }
@@ -837,11 +820,8 @@ mod tests {
         });
         let mut services = DecodingLayer::new(limits()).layer(service);
         let body = Body::new(StreamBody::new(parts));
-        let path = "/chefshat.v1.PlayService/Play";
-        services
-            .call(request(path, body))
-            .await
-            .expect("infallible");
+        let answer = services.call(request(PLAY, body)).await;
+        answer.expect("infallible");
     }
 
     #[tokio::test(start_paused = true)]
@@ -855,9 +835,6 @@ mod tests {
             taken.extend(permit.and_then(Result::ok));
         }
         let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
-        let play = v1::PlayRequest {
-            commands: vec![v1::SeatCommand::default(); 700],
-        };
         let create = v1::CreateStudyRequest {
             settings: Some(v1::StudySettings {
                 stages: vec![v1::StudyStage::default(); 100],
@@ -865,16 +842,12 @@ mod tests {
             }),
             ..v1::CreateStudyRequest::default()
         };
+        let create = framed(&create.encode_to_vec());
         for (path, message, reason) in [
-            (
-                "/chefshat.v1.StudyService/CreateStudy",
-                create.encode_to_vec(),
-                Some("TOO_MANY_LARGE_MESSAGES"),
-            ),
-            ("/chefshat.v1.PlayService/Play", play.encode_to_vec(), None),
+            (CREATE_STUDY, create, Some("TOO_MANY_LARGE_MESSAGES")),
+            (PLAY, commands(), None),
         ] {
-            let body = Body::new(http_body_util::Full::new(Bytes::from(framed(&message))));
-            let answer = services.call(request(path, body)).await;
+            let answer = services.call(whole(path, message)).await;
             let found = reason_of(&answer.expect("infallible"));
             assert_eq!(found.as_deref(), reason, "{path}");
         }
@@ -894,10 +867,10 @@ mod tests {
         };
         let large = framed(&setup(5_000).encode_to_vec());
         let small = framed(&setup(1_000).encode_to_vec());
-        let most = Cost::MAX;
+        let run = "/chefshat.v1.VectorService/Run";
         let memory = |message: &[u8]| {
-            let shape = shape("/chefshat.v1.VectorService/Run");
-            shape.cost(&message[PREFIX..], most).expect("legal").memory
+            let cost = shape(run).cost(&message[PREFIX..], Cost::MAX);
+            cost.expect("legal").memory
         };
         assert!(memory(&small) < MAX_FREE_DECODED && memory(&large) > MAX_FREE_DECODED);
         let cost = |message: &[u8]| memory(message) as u64 / DECODED_BYTES_PER_CALL;
@@ -905,14 +878,12 @@ mod tests {
         let key = charged(&http::Extensions::new());
         let mut send = async |path: &str, messages: &[&[u8]]| {
             let begun = Instant::now();
-            let body = http_body_util::Full::new(Bytes::from(messages.concat()));
-            let answer = services.call(request(path, Body::new(body))).await;
+            let answer = services.call(whole(path, messages.concat())).await;
             assert_eq!(reason_of(&answer.expect("infallible")), None, "{path}");
             begun.elapsed().as_secs_f64()
         };
         limits.charge(key, CALLS_AT_ONCE);
         // The first message of a stream costs; small ones after it do not.
-        let run = "/chefshat.v1.VectorService/Run";
         assert_eq!(send(run, &[&small, &small, &small]).await, 0.0);
         let wait = limits.wait(key).as_secs_f64();
         assert!((wait - time(cost(&small))).abs() < 0.001, "{wait}");
@@ -923,12 +894,8 @@ mod tests {
         let wait = limits.wait(key).as_secs_f64();
         assert!((wait - time(cost(&large))).abs() < 0.01, "{wait}");
         // Streams of one caller wait for each other: together they take as long.
-        let (path, body) = (run, [large.as_slice(), &large].concat());
         let begun = Instant::now();
-        let together = (0..3).map(|_| {
-            let body = http_body_util::Full::new(Bytes::from(body.clone()));
-            services.call(request(path, Body::new(body)))
-        });
+        let together = (0..3).map(|_| services.call(whole(run, large.repeat(2))));
         for answer in futures::future::join_all(together.collect::<Vec<_>>()).await {
             assert_eq!(reason_of(&answer.expect("infallible")), None);
         }
@@ -943,8 +910,7 @@ mod tests {
         };
         let import = framed(&import.encode_to_vec());
         let path = "/chefshat.v1.RecordService/ImportRecord";
-        let body = http_body_util::Full::new(Bytes::from(import.repeat(3)));
-        let answer = services.call(request(path, Body::new(body))).await;
+        let answer = services.call(whole(path, import.repeat(3))).await;
         assert_eq!(reason_of(&answer.expect("infallible")), None);
         let most = shape(path).cost(&import[PREFIX..], Cost::MAX);
         let expected = time(most.expect("legal").memory as u64 / DECODED_BYTES_PER_CALL);
@@ -954,9 +920,8 @@ mod tests {
         // Each question about the protocol counts as a call, because its answer is larger.
         tokio::time::sleep(limits.wait(key)).await;
         let path = "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
-        let body = http_body_util::Full::new(Bytes::from(framed(&[]).repeat(1_000)));
         let begun = Instant::now();
-        let answer = services.call(request(path, Body::new(body))).await;
+        let answer = services.call(whole(path, framed(&[]).repeat(1_000))).await;
         assert_eq!(reason_of(&answer.expect("infallible")), None);
         let waited = begun.elapsed().as_secs_f64();
         assert!((waited - time(1_000)).abs() < 0.1, "{waited}");
@@ -977,11 +942,8 @@ mod tests {
             }
         });
         let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service);
-        let play = v1::PlayRequest {
-            commands: vec![v1::SeatCommand::default(); 700],
-        };
-        let body = stalled(framed(&play.encode_to_vec()));
-        let mut call = Box::pin(services.call(request("/chefshat.v1.PlayService/Play", body)));
+        let body = stalled(commands());
+        let mut call = Box::pin(services.call(request(PLAY, body)));
         assert!((&mut call).now_or_never().is_none(), "it is executed");
         let size = size_of::<v1::SeatCommand>();
         assert!(limits.playing().taken() > 700 * size);

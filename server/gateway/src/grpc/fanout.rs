@@ -6,7 +6,7 @@ mod log;
 mod message;
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Weak};
 
 use bytes::Bytes;
 use chefshat_proto::v1::{self, SpectatorServiceWatchRequest};
@@ -20,6 +20,7 @@ use tonic::body::Body;
 use super::heartbeats::PREFIX;
 use super::status::room_gone;
 use chefshat_admission::limits::{CallLimits, Key};
+use chefshat_base::lock::Lock;
 use chefshat_base::proxies::FORWARDED_FOR;
 use chefshat_base::tasks::{LongTask, named};
 use log::{Reader, SharedStream};
@@ -42,7 +43,7 @@ pub(super) struct SameRequest {
 #[derive(Debug)]
 pub(super) struct Fanout {
     limits: Arc<CallLimits>,
-    streams: Mutex<HashMap<SameRequest, Weak<SharedStream>>>,
+    streams: Lock<HashMap<SameRequest, Weak<SharedStream>>>,
 }
 
 /// The key of a request, if its stream may be shared. A snapshot is of the moment, and a deadline is
@@ -75,7 +76,7 @@ impl Fanout {
     pub(super) fn new(limits: Arc<CallLimits>) -> Self {
         Self {
             limits,
-            streams: Mutex::default(),
+            streams: Lock::default(),
         }
     }
 
@@ -101,7 +102,7 @@ impl Fanout {
         let opening = Opening(SharedStream::new(Arc::clone(&self.limits), caller));
         let own = opening.0.reader().expect("it has just begun");
         {
-            let mut streams = self.streams.lock().expect("nothing panics under this lock");
+            let mut streams = self.streams.lock();
             streams.retain(|_, stream| stream.strong_count() > 0);
             streams.insert(key, Arc::downgrade(&opening.0));
         }
@@ -122,7 +123,7 @@ impl Fanout {
 
     /// Joins a stream that still has everything from its first message on.
     fn join(&self, key: &SameRequest) -> Option<Reader> {
-        let streams = self.streams.lock().expect("nothing panics under this lock");
+        let streams = self.streams.lock();
         streams.get(key)?.upgrade()?.reader()
     }
 }

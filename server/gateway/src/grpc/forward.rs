@@ -7,25 +7,21 @@
 //! The other node decides about access and charges the caller, so the headers that it needs for
 //! that pass with the request. It never passes the request on.
 
-use std::pin::Pin;
-use std::sync::{Arc, Mutex};
-use std::task::{Context, Poll};
+use std::sync::Arc;
 use std::time::Duration;
 
-use axum::body::HttpBody;
 use bytes::Bytes;
 use chefshat_proto::v1::{self, room_service_client::RoomServiceClient};
 use futures::future::{BoxFuture, Either};
 use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
-use http_body::{Frame, SizeHint};
+use http_body_util::{BodyExt as _, Full};
 use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::WatchStream;
-use tonic::Status;
 use tonic::body::Body;
 use tonic::metadata::MetadataMap;
 use tonic::transport::Channel;
-use tower::{Layer, Service, ServiceExt as _};
+use tower::{Service, ServiceExt as _};
 use tracing::debug;
 
 use super::deadline::Passed;
@@ -33,9 +29,11 @@ use super::fanout::{self, Fanout};
 use super::limits::Charged;
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
 use crate::connections::peer_address;
+use crate::front::{Front, InFront, take_ready};
 use crate::peers::Peers;
 use chefshat_admission::access::{Call, MAX_STUDY_MESSAGE_BYTES, SECRET_HEADER};
 use chefshat_admission::limits::{CallLimits, Key};
+use chefshat_base::lock::Lock;
 use chefshat_base::proxies::FORWARDED_FOR;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::cluster::{Directory, Elsewhere, Peer};
@@ -130,12 +128,16 @@ pub struct ForwardLayer {
 impl ForwardLayer {
     /// Creates a layer that sends calls to these peers. `limits` counts the spectators that share a
     /// stream.
-    pub fn new(directory: Arc<dyn Directory>, peers: Arc<Peers>, limits: Arc<CallLimits>) -> Self {
-        Self {
+    pub fn new(
+        directory: Arc<dyn Directory>,
+        peers: Arc<Peers>,
+        limits: Arc<CallLimits>,
+    ) -> InFront<Self> {
+        InFront(Self {
             directory,
             peers,
             fanout: Arc::new(Fanout::new(limits)),
-        }
+        })
     }
 
     /// What a request needs to ask other nodes itself.
@@ -147,50 +149,23 @@ impl ForwardLayer {
     }
 }
 
-impl<S> Layer<S> for ForwardLayer {
-    type Service = Forwarding<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        Forwarding {
-            layer: self.clone(),
-            services,
-        }
-    }
-}
-
-/// The services with forwarding in front of them.
-#[derive(Debug, Clone)]
-pub struct Forwarding<S> {
-    layer: ForwardLayer,
-    services: S,
-}
-
-impl<S> Service<Request<Body>> for Forwarding<S>
+impl<S> Front<S, Body> for ForwardLayer
 where
     S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+    type Answering = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+    fn answer(&self, services: &mut S, mut request: Request<Body>) -> Self::Answering {
         // Streams of seats, lists of everything and what is about several records ask other nodes
         // themselves.
-        let gateway = self.layer.gateway(&request);
+        let gateway = self.gateway(&request);
         request.extensions_mut().insert(gateway.clone());
         if !Call::find(request.uri().path()).is_some_and(|call| call.forwarded) {
-            return Either::Left(self.services.call(request));
+            return Either::Left(services.call(request));
         }
-        // The clone that is ready serves this call.
-        let clone = self.services.clone();
-        let services = std::mem::replace(&mut self.services, clone);
-        Either::Right(Box::pin(gateway.answer(services, request)))
+        Either::Right(Box::pin(gateway.answer(take_ready(services), request)))
     }
 }
 
@@ -208,11 +183,14 @@ impl Gateway {
     {
         let (parts, body) = request.into_parts();
         let address = Key::of_address(peer_address(&parts.extensions));
-        let kept = Kept::default();
-        let mut body = Body::new(KeepingBody {
-            body,
-            kept: kept.clone(),
-        });
+        let kept = Arc::new(Kept::default());
+        let keeping = Arc::clone(&kept);
+        let mut body = Body::new(body.map_frame(move |frame| {
+            if let Some(data) = frame.data_ref() {
+                keeping.add(data);
+            }
+            frame
+        }));
         for attempt in 1..=ATTEMPTS {
             let request = Request::from_parts(parts.clone(), body);
             let again = services.clone();
@@ -224,7 +202,7 @@ impl Gateway {
                 break;
             };
             let shared = fanout::key(parts.uri.path(), self.headers.as_arrived(), &message);
-            let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
+            let mut forwarded = Request::new(Body::new(Full::new(message.clone())));
             *forwarded.method_mut() = parts.method.clone();
             *forwarded.uri_mut() = parts.uri.clone();
             *forwarded.headers_mut() = self.headers.now();
@@ -262,7 +240,7 @@ impl Gateway {
             if attempt < ATTEMPTS {
                 tokio::time::sleep(PAUSE).await;
             }
-            body = Body::new(http_body_util::Full::new(message));
+            body = Body::new(Full::new(message));
             services = again;
             services.ready().await?;
         }
@@ -311,9 +289,9 @@ fn returned(answer: Response<Body>) -> Response<Body> {
     response
 }
 
-/// What has been read of the body of a request.
-#[derive(Clone, Default)]
-struct Kept(Arc<Mutex<Read>>);
+/// What has been read of the body of a request, which may be sent again.
+#[derive(Default)]
+struct Kept(Lock<Read>);
 
 #[derive(Default)]
 struct Read {
@@ -323,7 +301,7 @@ struct Read {
 
 impl Kept {
     fn add(&self, data: &Bytes) {
-        let mut read = (self.0.lock()).expect("nothing panics under this lock");
+        let mut read = self.0.lock();
         if read.bytes.len() + data.len() > MAX_KEPT_BYTES {
             read.too_long = true;
             read.bytes = Vec::new();
@@ -334,39 +312,7 @@ impl Kept {
 
     /// The message of the request, which has been read; `None` if it is too long.
     fn message(&self) -> Option<Bytes> {
-        let read = (self.0.lock()).expect("nothing panics under this lock");
+        let read = self.0.lock();
         (!read.too_long).then(|| Bytes::copy_from_slice(&read.bytes))
-    }
-}
-
-/// The body of a request that may be sent again.
-struct KeepingBody {
-    body: Body,
-    kept: Kept,
-}
-
-impl HttpBody for KeepingBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let frame = Pin::new(&mut self.body).poll_frame(context);
-        if let Poll::Ready(Some(Ok(frame))) = &frame
-            && let Some(data) = frame.data_ref()
-        {
-            self.kept.add(data);
-        }
-        frame
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }

@@ -14,8 +14,9 @@ use smallvec::SmallVec;
 use tokio::time::{Instant, Sleep, sleep_until};
 use tonic::Status;
 use tonic::body::Body;
-use tower::{Layer, Service};
+use tower::Service;
 
+use crate::front::Front;
 use chefshat_admission::access::Call;
 use chefshat_hosting::config::HEARTBEAT;
 
@@ -32,38 +33,18 @@ pub(super) const EMPTY: Bytes = Bytes::from_static(&[0; PREFIX]);
 #[derive(Debug, Clone, Copy)]
 pub struct HeartbeatLayer;
 
-impl<S> Layer<S> for HeartbeatLayer {
-    type Service = WithHeartbeats<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithHeartbeats { services }
-    }
-}
-
-/// The services, whose streams carry heartbeats.
-#[derive(Debug, Clone)]
-pub struct WithHeartbeats<S> {
-    services: S,
-}
-
-impl<S, B> Service<Request<B>> for WithHeartbeats<S>
+impl<S, B> Front<S, B> for HeartbeatLayer
 where
     S: Service<Request<B>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
+    type Answering = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+    fn answer(&self, services: &mut S, request: Request<B>) -> Self::Answering {
         let has_heartbeats = Call::find(request.uri().path()).is_some_and(|call| call.heartbeats);
         let interval = interval(request.headers());
-        let answering = self.services.call(request);
+        let answering = services.call(request);
         if !has_heartbeats {
             return Either::Left(answering);
         }
@@ -186,9 +167,10 @@ mod tests {
     use http_body_util::{BodyExt as _, StreamBody};
     use tokio::sync::mpsc;
     use tokio_stream::wrappers::ReceiverStream;
-    use tower::{ServiceExt as _, service_fn};
+    use tower::{Layer as _, ServiceExt as _, service_fn};
 
     use super::*;
+    use crate::front::InFront;
 
     const WATCH: &str = "/chefshat.v1.SpectatorService/Watch";
 
@@ -207,7 +189,8 @@ mod tests {
             request = request.header(HEADER, seconds);
         }
         let request = request.body(()).unwrap();
-        let Ok(answer) = HeartbeatLayer.layer(services).oneshot(request).await;
+        let services = InFront(HeartbeatLayer).layer(services);
+        let Ok(answer) = services.oneshot(request).await;
         (sender, answer.into_body())
     }
 

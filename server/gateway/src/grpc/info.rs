@@ -8,7 +8,7 @@ use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{
     self, server_service_client::ServerServiceClient, server_service_server::ServerService,
 };
-use chefshat_record::convert::{FieldProblem, action_space, rules_to_proto};
+use chefshat_record::convert::{action_space, rules_to_proto};
 use chefshat_tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use tonic::{Request, Response, Status};
 
@@ -16,7 +16,7 @@ use super::forward::Gateway;
 use super::limits::make_way;
 use super::lists;
 use super::lookup::Lookup;
-use super::status::{field, room_unknown};
+use super::status::{invalid, room_unknown};
 use chefshat_admission::access::{Caller, MAX_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES};
 use chefshat_admission::limits::CallLimits;
 use chefshat_base::SERVER_VERSION;
@@ -156,8 +156,8 @@ impl ServerService for Info {
             .ok()
             .and_then(ActionSpace::new)
             .ok_or_else(|| {
-                let problem = FieldProblem::new("faces", format!("{faces} is not in 4..=15"));
-                field("FACES_OUT_OF_RANGE", &problem)
+                let problem = format!("{faces} is not in 4..=15");
+                invalid("FACES_OUT_OF_RANGE", "faces", problem)
             })?;
         Ok(Response::new(v1::GetActionTableResponse {
             action_space: Some(action_space(&space)),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
-use chefshat_record::convert::{FieldProblem, check_label};
+use chefshat_record::convert::check_label;
 use chefshat_room::ids::{Token, UnitToken};
 use chefshat_room::journal::Marked;
 use futures::{Stream, stream};
@@ -14,13 +14,14 @@ use prost::Message as _;
 use tokio::time::Instant;
 use tonic::{Code, Request, Response, Status};
 
-use super::limits::charged;
+use super::access::opened;
 use super::lookup::Lookup;
 use super::status::{
-    MARKER_REFUSED, Refusal, field, internal, owner_token_wrong, room_failed, room_gone, status,
-    ticket_unknown,
+    MARKER_REFUSED, Refusal, field, internal, invalid, owner_token_wrong, room_failed, room_gone,
+    status, ticket_unknown,
 };
 use chefshat_admission::access::Caller;
+use chefshat_admission::limits::Key;
 use chefshat_hosting::room::{Handle, MarkRequest, MarkerFollower};
 use chefshat_store::samples::SampleError;
 
@@ -89,10 +90,7 @@ impl Instruments {
         let number = usize::try_from(owned.seat).ok();
         let Some(number) = number.filter(|number| *number < described.seats.len()) else {
             let words = format!("the room has {} seats, from 0", described.seats.len());
-            return Err(field(
-                "SAMPLES_REFUSED",
-                &FieldProblem::new("owned_seat.seat", words),
-            ));
+            return Err(invalid("SAMPLES_REFUSED", "owned_seat.seat", words));
         };
         let has_started = room.has_started().await.map_err(Refusal::from)?;
         Ok((room, Seat::new(number), has_started))
@@ -108,9 +106,8 @@ impl InstrumentService for Instruments {
         request: Request<v1::AddMarkerRequest>,
     ) -> Result<Response<v1::AddMarkerResponse>, Status> {
         let arrived = Instant::now();
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
         let (room, secret) = self
             .find(caller, &request.room_id, &request.owner_token)
             .await?;
@@ -136,9 +133,8 @@ impl InstrumentService for Instruments {
         &self,
         request: Request<v1::AddSamplesRequest>,
     ) -> Result<Response<v1::AddSamplesResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
         let (room, seat, has_started) = match &request.owned_seat {
             Some(owned) => self.owned_seat(&caller, owned).await?,
             None => self.seat_of(&caller, &request.ticket).await?,
@@ -165,8 +161,7 @@ impl InstrumentService for Instruments {
         &self,
         request: Request<v1::FollowMarkersRequest>,
     ) -> Result<Response<Self::FollowMarkersStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (room, secret) = self
             .find(caller, &request.room_id, &request.owner_token)
             .await?;

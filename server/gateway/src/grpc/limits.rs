@@ -14,10 +14,11 @@ use http_body::{Frame, SizeHint};
 use tokio::time::Instant;
 use tonic::body::Body;
 use tonic::{Code, Status};
-use tower::{Layer, Service};
+use tower::Service;
 
 use super::status::{Refusal, is_elsewhere, status};
 use crate::connections::{Client, Unread, peer_address};
+use crate::front::{Front, InFront, take_ready};
 use chefshat_admission::access::{Call, Caller};
 use chefshat_admission::limits::{Admitted, BYTES_PER_CALL, CallLimits, Executing, Key};
 
@@ -112,45 +113,21 @@ pub struct LimitsLayer {
 
 impl LimitsLayer {
     /// Creates a layer that asks `limits`.
-    pub fn new(limits: Arc<CallLimits>) -> Self {
-        Self { limits }
+    pub fn new(limits: Arc<CallLimits>) -> InFront<Self> {
+        InFront(Self { limits })
     }
 }
 
-impl<S> Layer<S> for LimitsLayer {
-    type Service = WithLimits<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithLimits {
-            limits: Arc::clone(&self.limits),
-            services,
-        }
-    }
-}
-
-/// The services with the limits in front of them.
-#[derive(Debug, Clone)]
-pub struct WithLimits<S> {
-    limits: Arc<CallLimits>,
-    services: S,
-}
-
-impl<S, B> Service<Request<B>> for WithLimits<S>
+impl<S, B> Front<S, B> for LimitsLayer
 where
     S: Service<Request<B>, Response = Response<Body>> + Clone + Send + 'static,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
     B: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = BoxFuture<'static, Result<Self::Response, Self::Error>>;
+    type Answering = BoxFuture<'static, Result<Response<Body>, S::Error>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+    fn answer(&self, services: &mut S, mut request: Request<B>) -> Self::Answering {
         request.extensions_mut().insert(Arrived(Instant::now()));
         let key = charged(request.extensions());
         let client = own_client(request.extensions()).cloned();
@@ -172,17 +149,14 @@ where
         };
         if let Some(admitted) = self.limits.admit_now(key, is_stream, cost) {
             place.admit(admitted, &mut request);
-            let answering = self.services.call(request);
+            let answering = services.call(request);
             return Box::pin(async move { Ok(place.keep(answering.await?)) });
         }
         let Some(waiting) = self.limits.place_to_wait(key) else {
             let status = too_many_waiting(place.client.as_ref());
             return Box::pin(async move { Ok(status.into_http()) });
         };
-        // The clone that is ready serves this call.
-        let clone = self.services.clone();
-        let mut services = std::mem::replace(&mut self.services, clone);
-        let limits = Arc::clone(&self.limits);
+        let (limits, mut services) = (Arc::clone(&self.limits), take_ready(services));
         Box::pin(async move {
             match limits.admit(key, is_stream, cost).await {
                 Ok(admitted) => {
@@ -404,7 +378,7 @@ mod tests {
     use std::convert::Infallible;
 
     use futures::FutureExt as _;
-    use tower::service_fn;
+    use tower::{Layer as _, service_fn};
 
     use super::*;
     use chefshat_admission::limits::{Shares, calls::MAX_ANSWERS};

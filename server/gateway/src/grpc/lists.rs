@@ -33,10 +33,7 @@ pub(super) struct Part<T> {
 }
 
 /// A page: entries, and the token of the next page, or nothing.
-pub(super) struct Page<T> {
-    pub(super) entries: Vec<T>,
-    pub(super) next_page_token: String,
-}
+type Page<T> = (Vec<T>, String);
 
 /// How a list is asked for at one node.
 pub(super) trait Listing {
@@ -59,11 +56,11 @@ pub(super) trait Listing {
         page_token: String,
     ) -> impl Future<Output = Result<Response<Self::Response>, Status>> + Send;
 
-    /// The page of a response.
-    fn page(response: Self::Response) -> Page<Self::Entry>;
+    /// The entries of a response, and the token of the next page, or nothing.
+    fn page(response: Self::Response) -> (Vec<Self::Entry>, String);
 
     /// The response with a page.
-    fn response(page: Page<Self::Entry>) -> Self::Response;
+    fn response(entries: Vec<Self::Entry>, next_page_token: String) -> Self::Response;
 
     /// When an entry was created, milliseconds since the Unix epoch.
     fn created_at_ms(entry: &Self::Entry) -> u64;
@@ -82,8 +79,8 @@ pub(super) async fn list<L: Listing>(
     if let Some(gateway) = extensions.get::<Gateway>() {
         // A node that cannot be reached holds up no other calls.
         make_way(extensions);
-        let page = everywhere(listing, gateway, page_token, page_size).await?;
-        return Ok(Response::new(L::response(page)));
+        let (entries, next) = everywhere(listing, gateway, page_token, page_size).await?;
+        return Ok(Response::new(L::response(entries, next)));
     }
     let part = listing.here(pages::last_shown(page_token)?).await?;
     let numbers: Vec<_> = part
@@ -91,10 +88,9 @@ pub(super) async fn list<L: Listing>(
         .iter()
         .map(|(number, _)| number.to_string())
         .collect();
-    let mut response = Response::new(L::response(Page {
-        entries: part.entries.into_iter().map(|(_, entry)| entry).collect(),
-        next_page_token: part.rest.map_or_else(String::new, |rest| rest.to_string()),
-    }));
+    let entries = part.entries.into_iter().map(|(_, entry)| entry).collect();
+    let next = part.rest.map_or_else(String::new, |rest| rest.to_string());
+    let mut response = Response::new(L::response(entries, next));
     if extensions.get::<FromPeer>().is_some() {
         let numbers = numbers.join(",").parse().expect("digits and commas");
         response.metadata_mut().insert(NUMBERS, numbers);
@@ -156,10 +152,10 @@ async fn ask<L: Listing>(
     let numbers: Vec<u64> = (numbers.unwrap_or_default().split(','))
         .filter_map(|number| number.parse().ok())
         .collect();
-    let page = L::page(response.into_inner());
+    let (entries, next) = L::page(response.into_inner());
     Ok(Part {
-        entries: numbers.into_iter().zip(page.entries).collect(),
-        rest: pages::last_shown(&page.next_page_token)?,
+        entries: numbers.into_iter().zip(entries).collect(),
+        rest: pages::last_shown(&next)?,
     })
 }
 
@@ -222,10 +218,7 @@ fn merged<T, K: PartialEq + ?Sized>(
         };
         Some((source.key, before))
     });
-    Page {
-        entries,
-        next_page_token: Shown(Some(left.collect())).to_token(),
-    }
+    (entries, Shown(Some(left.collect())).to_token())
 }
 
 /// How far the list of each node has been shown, by the node's key: the number of its last entry, or
@@ -314,37 +307,32 @@ mod tests {
             .map(|(key, part)| (key.to_owned(), None, part))
         };
         let page = merged(lists(), 2, |time| *time, |time| time);
-        assert_eq!(page.entries, [90, 80]);
-        assert_eq!(page.next_page_token, "a-100,b-100");
+        assert_eq!(page, (vec![90, 80], "a-100,b-100".to_owned()));
         // More of the second list may be newer than 50.
         let page = merged(lists(), 10, |time| *time, |time| time);
-        assert_eq!(page.entries, [90, 80, 70, 60]);
-        assert_eq!(page.next_page_token, "a-100,b-98");
+        assert_eq!(page, (vec![90, 80, 70, 60], "a-100,b-98".to_owned()));
         let one = [("a".to_owned(), None, part(&[5, 4], false))];
         let page = merged(one, 2, |time| *time, |time| time);
-        assert_eq!(
-            (page.entries, page.next_page_token.as_str()),
-            (vec![5, 4], "")
-        );
+        assert_eq!(page, (vec![5, 4], String::new()));
         let none = [
             ("a".to_owned(), None, part(&[5], false)),
             ("b".to_owned(), None, part(&[9], true)),
         ];
-        let page = merged(none, 1, |time| *time, |time| time);
-        assert_eq!(page.next_page_token, "a-,b-100");
-        let shown = Shown::parse(&page.next_page_token).expect("its own");
+        let (_, next) = merged(none, 1, |time| *time, |time| time);
+        assert_eq!(next, "a-,b-100");
+        let shown = Shown::parse(&next).expect("its own");
         assert!(shown.includes("a") && shown.before("a").is_none());
         assert!(shown.includes("b") && !shown.includes("c"));
         assert_eq!(shown.before("b"), Some(100));
-        assert_eq!(shown.to_token(), page.next_page_token);
+        assert_eq!(shown.to_token(), next);
         let copies = || {
             [("a", &[90, 50]), ("b", &[90, 10])]
                 .map(|(key, times)| (key.to_owned(), None, part(times, false)))
         };
-        let page = merged(copies(), 9, |time| *time, |time| time);
-        assert_eq!(page.entries, [90, 50, 10]);
-        let page = merged(copies(), 1, |time| *time, |time| time);
-        assert_eq!(page.next_page_token, "a-100,b-100");
+        let (entries, _) = merged(copies(), 9, |time| *time, |time| time);
+        assert_eq!(entries, [90, 50, 10]);
+        let (_, next) = merged(copies(), 1, |time| *time, |time| time);
+        assert_eq!(next, "a-100,b-100");
         for wrong in ["7", "a", "a-x", ",", "a-1,b"] {
             assert!(Shown::parse(wrong).is_err(), "{wrong}");
         }

@@ -452,11 +452,7 @@ impl Lookup {
         if relation > Relation::Stranger {
             return relation;
         }
-        let ids = [
-            Some(header.room_id.unit()),
-            tournament_of(header).map(TournamentId::unit),
-        ];
-        let secrets: Vec<_> = (ids.into_iter().flatten())
+        let secrets: Vec<_> = (units_of(header))
             .flat_map(|id| caller.secrets.of_id(id))
             .map(|token| token.secret)
             .collect();
@@ -482,11 +478,7 @@ impl Lookup {
                 _ => {}
             }
         }
-        let ids = [
-            Some(header.room_id.unit()),
-            tournament_of(header).map(TournamentId::unit),
-        ];
-        let by_ticket = (ids.into_iter().flatten())
+        let by_ticket = (units_of(header))
             .map(|id| (caller.secrets).relation(id, &header.owner, tickets.values().copied()));
         let relation = self.relation_by_header(caller, header);
         by_ticket.max().map_or(relation, |it| it.max(relation))
@@ -572,6 +564,12 @@ fn least_to_read(header: &GameHeader) -> Relation {
 
 fn tournament_of(header: &GameHeader) -> Option<TournamentId> {
     header.tournament.map(|game| game.tournament)
+}
+
+/// The room of a game and its tournament, of which its tickets are.
+fn units_of(header: &GameHeader) -> impl Iterator<Item = UnitId> {
+    let tournament = tournament_of(header).map(TournamentId::unit);
+    [header.room_id.unit()].into_iter().chain(tournament)
 }
 
 /// Whether the scope of a caller includes a game.

@@ -7,6 +7,7 @@ mod analysis;
 mod deadline;
 mod decoding;
 mod fanout;
+mod fields;
 mod follow;
 mod forward;
 mod heartbeats;

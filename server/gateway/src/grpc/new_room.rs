@@ -12,9 +12,10 @@ use chefshat_referee::Referee;
 use prost::Message as _;
 use tonic::{Code, Status};
 
+use super::fields::{checked_name, request_id};
 use super::forward::Gateway;
 use super::recorded::Recorded;
-use super::status::{field, request_id, status};
+use super::status::{field, invalid, status};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{Key, Payer};
 use chefshat_hosting::rooms::NewRoom;
@@ -39,8 +40,7 @@ pub(super) async fn new_room(
 ) -> Result<NewRoom, Status> {
     let request_id = request_id(&std::mem::take(&mut request.request_id), caller)?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
-    let name = convert::checked_name("name", &request.name, 0)
-        .map_err(|problem| field("NAME_REFUSED", &problem))?;
+    let name = checked_name("name", &request.name, 0)?;
     let policy = supported_policy(recorded, &request.policy.clone().unwrap_or_default())
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
     let game_seed = game_seed(&request.game_seed)?;
@@ -87,10 +87,7 @@ pub(super) async fn new_room(
         check_agents(&policy, &fills)?;
         if policy.hints {
             let problem = "hints are not given at tables with real cards";
-            return Err(field(
-                "POLICY_REFUSED",
-                &FieldProblem::new("hints", problem),
-            ));
+            return Err(invalid("POLICY_REFUSED", "hints", problem));
         }
     }
     let display_names = convert::display_names_from_proto(&request.seats).map_err(refused)?;
@@ -120,9 +117,7 @@ fn check_table(
     fills: &[Fill],
     rules: &RuleSet,
 ) -> Result<(), Status> {
-    let refused = |reason, name, message: &str| {
-        Err(field(reason, &FieldProblem::new(name, message.to_owned())))
-    };
+    let refused = |reason, name, message: &str| Err(invalid(reason, name, message.to_owned()));
     let any_at_table = (fills.iter()).any(|fill| matches!(fill, Fill::AtTable(_)));
     if !request.physical {
         return match any_at_table {
@@ -229,7 +224,7 @@ fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
     }
     bytes.try_into().map(Some).map_err(|_| {
         let message = format!("{} bytes; give 32, or none", bytes.len());
-        field("SEED_REFUSED", &FieldProblem::new("game_seed", message))
+        invalid("SEED_REFUSED", "game_seed", message)
     })
 }
 
@@ -240,9 +235,7 @@ async fn branched(
     rules: Option<&v1::RuleSet>,
     game_seed: Option<[u8; 32]>,
 ) -> Result<Beginning, Status> {
-    let refused = |name: &'static str, message: String| {
-        field("BRANCH_REFUSED", &FieldProblem::new(name, message))
-    };
+    let refused = |name: &'static str, message: String| invalid("BRANCH_REFUSED", name, message);
     if rules.is_some_and(|rules| *rules != v1::RuleSet::default()) {
         let message = "leave it unset: the rules are those of the recorded game";
         return Err(refused("rules", message.to_owned()));
@@ -289,10 +282,7 @@ pub(super) fn branch_refused(error: &BranchError) -> Status {
         BranchError::TooFar { .. } | BranchError::Over(_) => "decisions",
         _ => "game_id",
     };
-    field(
-        "BRANCH_REFUSED",
-        &FieldProblem::new(name, error.to_string()),
-    )
+    invalid("BRANCH_REFUSED", name, error.to_string())
 }
 
 /// The recorded players of seats that replay one.
@@ -312,10 +302,7 @@ async fn recorded_players(
                 convert::recorded_player(&lines, number)
             })
             .await?
-            .map_err(|error| {
-                let problem = FieldProblem::new("seats", error.to_string());
-                field("SEATS_REFUSED", &problem)
-            })?;
+            .map_err(|error| invalid("SEATS_REFUSED", "seats", error.to_string()))?;
         players.insert(index, player);
     }
     Ok(players)

@@ -1,8 +1,8 @@
 //! A rate that several tasks keep together.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use chefshat_base::lock::Lock;
 use tokio::time::{Instant, sleep_until};
 
 /// A number of bytes per second, for tasks in the order in which they ask.
@@ -10,7 +10,7 @@ use tokio::time::{Instant, sleep_until};
 pub(super) struct Pace {
     per_second: usize,
     /// When all that came before has passed.
-    free_at: Mutex<Instant>,
+    free_at: Lock<Instant>,
 }
 
 impl Pace {
@@ -18,7 +18,7 @@ impl Pace {
     pub(super) fn new(per_second: usize) -> Self {
         Self {
             per_second,
-            free_at: Mutex::new(Instant::now()),
+            free_at: Lock::new(Instant::now()),
         }
     }
 
@@ -27,7 +27,7 @@ impl Pace {
     pub(super) async fn pass(&self, bytes: usize) {
         let time = Duration::from_secs_f64(bytes as f64 / self.per_second as f64);
         let passed = {
-            let mut free_at = self.free_at();
+            let mut free_at = self.free_at.lock();
             *free_at = (*free_at).max(Instant::now()) + time;
             *free_at
         };
@@ -38,10 +38,6 @@ impl Pace {
         };
         sleep_until(passed).await;
         std::mem::forget(waiting);
-    }
-
-    fn free_at(&self) -> MutexGuard<'_, Instant> {
-        self.free_at.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -57,7 +53,7 @@ struct Waiting<'a> {
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
         let left = self.passed.saturating_duration_since(Instant::now());
-        *self.pace.free_at() -= left.min(self.time);
+        *self.pace.free_at.lock() -= left.min(self.time);
     }
 }
 

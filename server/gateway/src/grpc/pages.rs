@@ -1,9 +1,8 @@
 //! Paging of lists: page sizes and tokens.
 
-use chefshat_record::convert::FieldProblem;
 use tonic::Status;
 
-use super::status::field;
+use super::status::invalid;
 
 /// Default page size.
 const DEFAULT_PAGE_SIZE: u32 = 50;
@@ -12,10 +11,12 @@ const MAX_PAGE_SIZE: u32 = 100;
 
 /// The page size of a request.
 pub(super) fn page_size(asked: u32) -> usize {
-    let size = match asked {
-        0 => DEFAULT_PAGE_SIZE,
-        size => size.min(MAX_PAGE_SIZE),
-    };
+    size_within(asked, DEFAULT_PAGE_SIZE, MAX_PAGE_SIZE)
+}
+
+/// The number of entries of a request: `default` if it asks for none, and at most `most`.
+pub(super) fn size_within(asked: u32, default: u32, most: u32) -> usize {
+    let size = if asked == 0 { default } else { asked.min(most) };
     usize::try_from(size).unwrap_or(usize::MAX)
 }
 
@@ -29,6 +30,6 @@ pub(super) fn last_shown(page_token: &str) -> Result<Option<u64>, Status> {
 
 /// A page token is not one of this server.
 pub(super) fn token_refused() -> Status {
-    let problem = FieldProblem::new("page_token", "not a token of this server");
-    field("PAGE_TOKEN_REFUSED", &problem)
+    let problem = "not a token of this server";
+    invalid("PAGE_TOKEN_REFUSED", "page_token", problem)
 }

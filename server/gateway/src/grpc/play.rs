@@ -11,6 +11,8 @@ mod participants;
 mod reader;
 mod remote;
 mod requests;
+#[cfg(test)]
+mod testing;
 mod waiting;
 
 use std::future::poll_fn;
@@ -19,16 +21,18 @@ use std::sync::{Arc, OnceLock};
 use std::task::{Context, Poll};
 
 use chefshat_proto::v1::{self, act_request};
-use chefshat_record::convert::FieldProblem;
 use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::analysis::estimate_to_proto;
+use super::fields::request_id;
 use super::forward::Gateway;
 use super::limits::{Arrived, make_way};
 use super::lookup::Lookup;
-use super::status::{field, request_id, room_failed, room_unknown, stream_ended, ticket_unknown};
+use super::status::{
+    command_missing, invalid, room_failed, room_unknown, stream_ended, ticket_unknown,
+};
 use crate::peers::Peers;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{Executing, FairSemaphore, Hint, Key};
@@ -229,9 +233,10 @@ impl PlayService for Play {
         let gateway: Option<Gateway> = request.extensions().get().cloned();
         let seats = request.into_inner().seats;
         if !(1..=MAX_SEATS_PER_WATCH).contains(&seats.len()) {
-            return Err(field(
+            return Err(invalid(
                 "SEATS_REFUSED",
-                &FieldProblem::new("seats", format!("list 1 to {MAX_SEATS_PER_WATCH} seats")),
+                "seats",
+                format!("list 1 to {MAX_SEATS_PER_WATCH} seats"),
             ));
         }
         let (outbox, updates) = Outbox::new();
@@ -324,8 +329,7 @@ impl Command {
                 Self::Perform(SeatAction::Answer(convert::answer_from_proto(answer)))
             }
             Some(act_request::Command::Express(expression)) => {
-                let action = express_action(&expression);
-                Self::Perform(action.map_err(|problem| field("EXPRESSION_REFUSED", &problem))?)
+                Self::Perform(express_action(&expression)?)
             }
             Some(act_request::Command::Resume(_)) => Self::Perform(SeatAction::Resume),
             Some(act_request::Command::Hint(ask)) => {
@@ -334,8 +338,7 @@ impl Command {
                 Self::Hint(ask.decision_id, request_id)
             }
             None => {
-                let problem = FieldProblem::new("command", "set a command");
-                return Err(field("COMMAND_MISSING", &problem));
+                return Err(command_missing());
             }
         })
     }

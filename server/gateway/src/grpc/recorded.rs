@@ -11,7 +11,7 @@ use tonic::{Code, Status};
 use super::access::refused;
 use super::forward::Gateway;
 use super::lookup::{Lookup, RecordView};
-use super::status::{self, is_elsewhere, is_refusal, owner_unreachable, status};
+use super::status::{self, is_elsewhere, is_refusal, owner_unreachable, series_open, status};
 use chefshat_admission::access::{Caller, Refusal, Role};
 use chefshat_admission::limits::{FairSemaphore, Key, Permit};
 use chefshat_base::threads::{Priority, Threads};
@@ -21,9 +21,6 @@ use chefshat_hosting::rooms::Rooms;
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_store::MAX_CONCURRENT_RECORDS;
 use chefshat_store::StoreError;
-
-/// Reason of the error while games with the same deals are being played.
-pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 
 /// The recorded games of a server.
 #[derive(Debug, Clone)]
@@ -224,14 +221,4 @@ async fn record_at(
         lines.extend(response.lines);
     }
     Ok(lines)
-}
-
-/// Games with the same deals are being played.
-fn series_open() -> Status {
-    status(
-        Code::FailedPrecondition,
-        SERIES_OPEN,
-        "other games with the same deals are being played; the record is available when they have ended",
-        [("field", "game_id")],
-    )
 }

@@ -7,7 +7,6 @@ use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1::{
     self, game_event::Kind, record_line::Line, record_service_server::RecordService,
 };
-use chefshat_record::convert::FieldProblem;
 use chefshat_record::jsonl::excess;
 use chefshat_record::replay;
 use chefshat_record::signature::SigningKey;
@@ -17,16 +16,17 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::access::opened;
 use super::follow::{self, Responses, Sender};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lookup::RecordView;
 use super::pace::Pace;
 use super::pages;
-use super::recorded::{Recorded, SERIES_OPEN};
+use super::recorded::Recorded;
 use super::status::{
-    OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason,
-    read_failed, status,
+    OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, SERIES_OPEN, UNREADABLE, disk_nearly_full,
+    has_reason, invalid, read_failed, status,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
@@ -218,8 +218,7 @@ impl RecordService for Records {
         &self,
         request: Request<v1::ListRecordsRequest>,
     ) -> Result<Response<v1::ListRecordsResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let filter = checked(request.filter)?;
         let mut last = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
@@ -265,13 +264,14 @@ impl RecordService for Records {
         &self,
         request: Request<v1::GetRecordRequest>,
     ) -> Result<Response<Self::GetRecordStream>, Status> {
-        let caller = Caller::of(request.extensions());
-
-        let place = self.sending.take(charged(request.extensions())).await;
-        let game_id = request.into_inner().game_id;
+        let (caller, request) = opened(request);
+        let place = self.sending.take(Key::of_caller(&caller)).await;
         let key = self.key.clone();
         let shown = move |lines, view| seen(view, key.as_deref(), lines);
-        let lines = self.recorded.of_game(&caller, &game_id, shown).await?;
+        let lines = self
+            .recorded
+            .of_game(&caller, &request.game_id, shown)
+            .await?;
         // One record is sent also while the server closes its streams.
         let closing = CancellationToken::new();
         let (response, sending) = follow::stream(closing, move |sender| async move {
@@ -286,10 +286,9 @@ impl RecordService for Records {
         &self,
         request: Request<v1::StreamRecordsRequest>,
     ) -> Result<Response<Self::StreamRecordsStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         let gateway: Option<Gateway> = request.extensions().get().cloned();
-        let mut request = request.into_inner();
+        let (caller, mut request) = opened(request);
+        let key = Key::of_caller(&caller);
         let filter = checked(request.filter.take())?;
         let service = self.clone();
         let (response, sending) = follow::stream(self.closing.clone(), move |sender| async move {
@@ -413,20 +412,13 @@ fn is_withheld_in(line: &v1::RecordLine) -> bool {
 /// Checks that the enum values of a filter are known.
 fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status> {
     let filter = filter.unwrap_or_default();
-    let wrong = if v1::RoomState::try_from(filter.state).is_err() {
-        Some("state")
-    } else if v1::ParticipantKind::try_from(filter.kind).is_err() {
-        Some("kind")
-    } else if v1::GameOrigin::try_from(filter.origin).is_err() {
-        Some("origin")
-    } else {
-        None
-    };
-    match wrong {
-        Some(name) => {
-            let problem = FieldProblem::new(name, "not a value of this enum");
-            Err(field("FILTER_REFUSED", &problem))
-        }
+    let unknown = [
+        ("state", v1::RoomState::try_from(filter.state).is_err()),
+        ("kind", v1::ParticipantKind::try_from(filter.kind).is_err()),
+        ("origin", v1::GameOrigin::try_from(filter.origin).is_err()),
+    ];
+    match unknown.into_iter().find(|(_, is_unknown)| *is_unknown) {
+        Some((name, _)) => Err(invalid("FILTER_REFUSED", name, "not a value of this enum")),
         None => Ok(filter),
     }
 }

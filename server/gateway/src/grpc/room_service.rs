@@ -7,22 +7,22 @@ use std::time::Duration;
 use chefshat_proto::v1::{
     self, room_service_client::RoomServiceClient, room_service_server::RoomService,
 };
-use chefshat_record::convert::{FieldProblem, seat_number};
+use chefshat_record::convert::seat_number;
 use futures::{Stream, StreamExt as _};
 use tokio::time::{Instant, timeout};
 use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
+use super::access::opened;
+use super::fields::{checked_kind, checked_name, name_fingerprint, request_id};
 use super::forward::Gateway;
-use super::limits::{charged, make_way};
-use super::lists::{self, Listing, Page, Part};
+use super::limits::make_way;
+use super::lists::{self, Listing, Part};
 use super::lookup::Lookup;
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
-use super::status::{
-    self, Refusal, field, name_fingerprint, request_id, room_failed, room_gone, ticket_unknown,
-};
+use super::status::{self, Refusal, invalid, not_created, room_failed, room_gone, ticket_unknown};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
 use chefshat_hosting::room::{Handle, JoinRequest};
@@ -30,7 +30,6 @@ use chefshat_hosting::rooms::{CreateError, Rooms};
 use chefshat_room::ids::{CODE_LENGTH, RoomId, RoomToken, Token, normal_code};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_store::StoreError;
-use chefshat_wire::convert;
 
 /// Rooms examined for one page.
 const ROOMS_LOOKED_AT: usize = 200;
@@ -81,8 +80,8 @@ impl RoomCalls {
         caller: &Caller,
         room_id: &str,
         join_code: &str,
-        key: Key,
     ) -> Result<Handle, Status> {
+        let key = Key::of_caller(caller);
         let refused = |refused| Status::from(Refusal::from(refused));
         self.calls.may_try_code(key).map_err(refused)?;
         let found = match room_id {
@@ -102,7 +101,7 @@ impl RoomCalls {
             if !room_id.is_empty() {
                 self.lookup().room(caller, room_id).await?;
             }
-            return Err(join_code_wrong());
+            return Err(status::join_code_wrong());
         };
         self.lookup().check_joining(caller, handle.id())?;
         Ok(handle)
@@ -187,17 +186,14 @@ impl Listing for RoomList<'_> {
         service.list_rooms(gateway.request(request)).await
     }
 
-    fn page(response: v1::ListRoomsResponse) -> Page<v1::Room> {
-        Page {
-            entries: response.rooms,
-            next_page_token: response.next_page_token,
-        }
+    fn page(response: v1::ListRoomsResponse) -> (Vec<v1::Room>, String) {
+        (response.rooms, response.next_page_token)
     }
 
-    fn response(page: Page<v1::Room>) -> v1::ListRoomsResponse {
+    fn response(rooms: Vec<v1::Room>, next_page_token: String) -> v1::ListRoomsResponse {
         v1::ListRoomsResponse {
-            rooms: page.entries,
-            next_page_token: page.next_page_token,
+            rooms,
+            next_page_token,
         }
     }
 
@@ -229,11 +225,11 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::CreateRoomRequest>,
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         let gateway: Option<Gateway> = request.extensions().get().cloned();
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
         let reading = (&self.recorded, &caller, gateway.as_ref());
-        let new = new_room(reading, request.into_inner(), key).await?;
+        let new = new_room(reading, request, key).await?;
         let request = new.request;
         // Another node would not ask for the recorded games that a request names.
         let is_recorded = !new.recorded.is_empty() || new.start.branch.is_some();
@@ -255,7 +251,7 @@ impl RoomService for RoomCalls {
                 .check_not_created_elsewhere(request, key)
                 .await?;
         }
-        let created = created.map_err(Refusal::from)?;
+        let created = created.map_err(|error| not_created(error, |never| match never {}))?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
             room: Some(room),
@@ -272,14 +268,12 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::GetRoomRequest>,
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         // Who waits for a room that waits for its commit holds up no other calls.
         make_way(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let handle = match request.join_code.as_str() {
             "" => self.lookup().room(&caller, &request.room_id).await?,
-            code => (self.find_by_code(&caller, &request.room_id, code, key)).await?,
+            code => self.find_by_code(&caller, &request.room_id, code).await?,
         };
         let mut room = handle.describe().await.map_err(Refusal::from)?;
         let next_join_code = handle.next_join_code();
@@ -294,18 +288,17 @@ impl RoomService for RoomCalls {
         request: Request<v1::ListRoomsRequest>,
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         let (_, extensions, message) = request.into_parts();
         // Who waits for a turn holds up no other calls.
         make_way(&extensions);
-        let _turn = self.calls.list(key).await;
+        let _turn = self.calls.list(Key::of_caller(&caller)).await;
         let over = match v1::RoomState::try_from(message.state) {
             Ok(v1::RoomState::Unspecified) => None,
             Ok(v1::RoomState::Waiting | v1::RoomState::Playing) => Some(false),
             Ok(v1::RoomState::Finished | v1::RoomState::Aborted) => Some(true),
             Err(_) => {
-                let problem = FieldProblem::new("state", "not a value of this enum");
-                return Err(field("STATE_REFUSED", &problem));
+                let problem = "not a value of this enum";
+                return Err(invalid("STATE_REFUSED", "state", problem));
             }
         };
         let listing = RoomList {
@@ -322,19 +315,14 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::JoinRoomRequest>,
     ) -> Result<Response<v1::JoinRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         if self.rooms.is_shutting_down() {
             return Err(status::shutting_down());
         }
         let (id, code) = (&request.room_id, &request.join_code);
-        let handle = self.find_by_code(&caller, id, code, key).await?;
-        let kind = convert::kind_from_proto("kind", request.kind)
-            .map_err(|problem| field("KIND_REFUSED", &problem))?
-            .unwrap_or(ParticipantKind::Agent);
-        let name = convert::checked_name("name", &request.name, 1)
-            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let handle = self.find_by_code(&caller, id, code).await?;
+        let kind = checked_kind(request.kind)?.unwrap_or(ParticipantKind::Agent);
+        let name = checked_name("name", &request.name, 1)?;
         let request_id = request_id(&request.request_id, &caller)?;
         let name_fingerprint = name_fingerprint(&name, &request.name_key)?;
         let joined = handle
@@ -360,8 +348,8 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::LeaveRoomRequest>,
     ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let ticket = RoomToken::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
+        let (caller, request) = opened(request);
+        let ticket = RoomToken::parse(&request.ticket).ok_or_else(ticket_unknown)?;
         let lookup = self.lookup();
         let handle = lookup
             .room_of_ticket(&caller, ticket.subject, ticket_unknown)
@@ -375,9 +363,8 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::CloseRoomRequest>,
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
+        let (caller, request) = opened(request);
         let client = Payer::of_caller(&caller);
-        let request = request.into_inner();
         let caller = caller.showing(&request.owner_token);
         let handle = self.lookup().room(&caller, &request.room_id).await?;
         let token = Token::parse(&request.owner_token)
@@ -394,8 +381,7 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::SetNextRoomRequest>,
     ) -> Result<Response<v1::SetNextRoomResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let caller = (caller.showing(&request.owner_token)).showing(&request.ticket);
         let handle = self.lookup().room(&caller, &request.room_id).await?;
         let header = self.rooms.header(handle.id());
@@ -410,7 +396,7 @@ impl RoomService for RoomCalls {
         }
         let join_code = normal_code(&request.join_code);
         if join_code.len() != CODE_LENGTH {
-            return Err(join_code_wrong());
+            return Err(status::join_code_wrong());
         }
         loop {
             let earlier = handle.next_join_code();
@@ -427,15 +413,6 @@ impl RoomService for RoomCalls {
             }
         }
     }
-}
-
-fn join_code_wrong() -> Status {
-    status::status(
-        Code::PermissionDenied,
-        "JOIN_CODE_WRONG",
-        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one",
-        [("field", "join_code")],
-    )
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use futures::{Stream, TryStreamExt as _};
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
+use super::access::opened;
 use super::lookup::Lookup;
 use super::status::{room_failed, room_gone, stream_ended};
-use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
@@ -40,9 +40,8 @@ impl SpectatorService for Spectate {
         &self,
         request: Request<SpectatorServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let caller = Caller::of(request.extensions());
+        let (caller, request) = opened(request);
         let charged = Key::of_caller(&caller);
-        let request = request.into_inner();
         let room = self.lookup.room(&caller, &request.room_id).await?;
         let header = self.lookup.rooms().header(room.id());
         let is_owner = header.is_some_and(|it| self.lookup.is_owner(&caller, &it));

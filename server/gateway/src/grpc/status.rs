@@ -13,13 +13,10 @@ use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{NotStored, Refused};
 use chefshat_hosting::cluster::Elsewhere;
-use chefshat_hosting::journaled::CreateProblem;
 use chefshat_hosting::room::{ReportRefusal, RoomError, RoomGone, SpectateError};
 use chefshat_hosting::rooms::CreateError;
-use chefshat_room::ids::request_id_of;
 use chefshat_room::{
     ExpressError, HintError, JoinError, LeaveError, MARKERS_AT_ONCE, MAX_MARKERS, MarkError,
     ReportError,
@@ -58,6 +55,79 @@ fn with_reason(
     )
 }
 
+/// Statuses that are always the same: their names, codes, reasons, messages, and the fields at fault.
+macro_rules! statuses {
+    ($($(#[$doc:meta])* $vis:vis $name:ident: $code:ident, $reason:tt $(in $field:literal)?, $message:literal;)+) => {
+        $(
+            $(#[$doc])*
+            $vis fn $name() -> Status {
+                status(Code::$code, $reason, $message, [$(("field", $field))?])
+            }
+        )+
+    };
+}
+
+statuses! {
+    /// Too many calls to games wait for a stream.
+    pub calls_not_taken: Unavailable, "CALLS_NOT_TAKEN",
+        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream";
+    /// Replies to commands wait for a stream that is not read.
+    updates_not_taken: Unavailable, "UPDATES_NOT_TAKEN",
+        "replies to commands wait, and the stream is not read; connect again, and read what it sends";
+    /// No tournament has this id.
+    pub tournament_unknown: NotFound, "TOURNAMENT_UNKNOWN" in "tournament_id",
+        "this tournament does not exist";
+    /// There is no such room.
+    pub room_unknown: NotFound, "ROOM_UNKNOWN",
+        "this room does not exist; it may have been closed";
+    /// No study has this id, or another owner token.
+    pub(super) study_unknown: NotFound, "STUDY_UNKNOWN" in "study_id",
+        "this server has no study with this id and owner token";
+    /// No participant has this link.
+    pub(super) link_unknown: Unauthenticated, "LINK_UNKNOWN" in "link",
+        "this is not a link of a study on this server; check that it is complete";
+    /// No room has this join code.
+    pub(super) join_code_wrong: PermissionDenied, "JOIN_CODE_WRONG" in "join_code",
+        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one";
+    /// Those of this kind do not take part in a tournament.
+    pub(super) kind_not_admitted: FailedPrecondition, "KIND_NOT_ADMITTED" in "kind",
+        "this tournament does not admit this kind of participant";
+    /// Games with the same deals are being played.
+    pub(super) series_open: FailedPrecondition, SERIES_OPEN in "game_id",
+        "other games with the same deals are being played; the record is available when they have ended";
+    /// A token is not that of the room's creator.
+    pub owner_token_wrong: PermissionDenied, "OWNER_TOKEN_WRONG" in "owner_token",
+        "this is not the owner token that CreateRoom returned for this room";
+    /// No seat has this ticket.
+    pub ticket_unknown: Unauthenticated, "TICKET_UNKNOWN" in "ticket",
+        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again";
+    /// No physical table has this ticket.
+    pub table_unknown: Unauthenticated, "TICKET_UNKNOWN" in "table_ticket",
+        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament";
+    /// The server's store failed, and the server stops.
+    pub store_failed: Unavailable, "STORE_FAILED",
+        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back";
+    /// The server failed in a way that clients cannot resolve.
+    pub internal: Internal, "INTERNAL",
+        "the server failed to do this; see its log";
+    /// The server is shutting down.
+    pub shutting_down: Unavailable, "SHUTTING_DOWN",
+        "the server is shutting down";
+    /// A spectator was disconnected because it reads too slowly.
+    pub spectator_too_slow: ResourceExhausted, "SPECTATOR_TOO_SLOW",
+        "the stream was not read fast enough; watch again from the number after the last event received";
+    /// A room became unreachable: it has just ended, or was suspended because the server stops.
+    pub room_gone: Unavailable, "ROOM_GONE",
+        "the room cannot be reached here: it has just ended, the server is stopping, or it does not reach the one that has the room; connect again";
+    /// This node does not have what a request is about. Only nodes see it: the one that has passed the
+    /// request on looks for the owner again.
+    not_owner: Unavailable, NOT_OWNER,
+        "another node has this room or tournament";
+    /// The node that has a room or tournament cannot be reached, or is just handing it over.
+    pub owner_unreachable: Unavailable, OWNER_UNREACHABLE,
+        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again";
+}
+
 /// The status for a refused request of a vector stream.
 pub fn vector_refused(error: RequestError) -> Status {
     let code = match error.reason {
@@ -67,26 +137,6 @@ pub fn vector_refused(error: RequestError) -> Status {
     let metadata = error.metadata.into_iter();
     let metadata = metadata.map(|(key, value)| (key.to_owned(), value));
     with_reason(code, error.reason, error.message, metadata.collect())
-}
-
-/// Too many calls to games wait for a stream.
-pub fn calls_not_taken() -> Status {
-    status(
-        Code::Unavailable,
-        "CALLS_NOT_TAKEN",
-        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream",
-        [],
-    )
-}
-
-/// Replies to commands wait for a stream that is not read.
-fn updates_not_taken() -> Status {
-    status(
-        Code::Unavailable,
-        "UPDATES_NOT_TAKEN",
-        "replies to commands wait, and the stream is not read; connect again, and read what it sends",
-        [],
-    )
 }
 
 /// Whether a status has this reason.
@@ -119,8 +169,16 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
     )
 }
 
+/// The status for an invalid field, and what is wrong with it.
+pub fn invalid(reason: &str, name: &'static str, problem: impl Into<String>) -> Status {
+    field(reason, &FieldProblem::new(name, problem))
+}
+
 /// Reason of the error while the server that has what a call is about cannot be reached.
 pub(super) const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
+
+/// Reason of the error while games with the same deals are being played.
+pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 
 /// The status for a client when the store cannot be read.
 pub fn read_failed(error: StoreError) -> Status {
@@ -141,88 +199,6 @@ pub const RECORD_UNREADABLE: &str = "RECORD_UNREADABLE";
 /// Its message.
 pub const UNREADABLE: &str = "the server has this record but cannot read it; its log says why";
 
-/// No tournament has this id.
-pub fn tournament_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "TOURNAMENT_UNKNOWN",
-        "this tournament does not exist",
-        [("field", "tournament_id")],
-    )
-}
-
-/// There is no such room.
-pub fn room_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "ROOM_UNKNOWN",
-        "this room does not exist; it may have been closed",
-        [],
-    )
-}
-
-/// A token is not that of the room's creator.
-pub fn owner_token_wrong() -> Status {
-    status(
-        Code::PermissionDenied,
-        "OWNER_TOKEN_WRONG",
-        "this is not the owner token that CreateRoom returned for this room",
-        [("field", "owner_token")],
-    )
-}
-
-/// No seat has this ticket.
-pub fn ticket_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "TICKET_UNKNOWN",
-        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again",
-        [("field", "ticket")],
-    )
-}
-
-/// No physical table has this ticket.
-pub fn table_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "TICKET_UNKNOWN",
-        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament",
-        [("field", "table_ticket")],
-    )
-}
-
-/// The id of a request, if set, as it counts for its caller: the answer to a repeated request
-/// contains secrets, and another token does not get them. Callers without a token are not told apart
-/// by their addresses, because a client that repeats a request may have another one by then.
-pub fn request_id(bytes: &[u8], caller: &Caller) -> Result<Option<[u8; 32]>, Status> {
-    if bytes.is_empty() {
-        return Ok(None);
-    }
-    let id = bytes.try_into().map_err(|_| {
-        let message = format!("{} bytes; give 32 random ones, or none", bytes.len());
-        field(
-            "REQUEST_ID_REFUSED",
-            &FieldProblem::new("request_id", message),
-        )
-    })?;
-    Ok(Some(match &caller.token_hash {
-        Some(token) => request_id_of(id, token),
-        None => *id,
-    }))
-}
-
-/// The fingerprint of a name and its key; empty without a key.
-pub fn name_fingerprint(name: &str, key: &[u8]) -> Result<String, Status> {
-    if key.is_empty() {
-        return Ok(String::new());
-    }
-    let key = key.try_into().map_err(|_| {
-        let message = format!("{} bytes; give 32 random ones, or none", key.len());
-        field("NAME_KEY_REFUSED", &FieldProblem::new("name_key", message))
-    })?;
-    Ok(convert::name_fingerprint(name, key))
-}
-
 /// A request id was reused with other content.
 pub fn request_id_used(message: &str) -> Status {
     status(
@@ -238,26 +214,6 @@ pub fn disk_nearly_full(message: &str) -> Status {
     status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
 }
 
-/// The server's store failed, and the server stops.
-pub fn store_failed() -> Status {
-    status(
-        Code::Unavailable,
-        "STORE_FAILED",
-        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back",
-        [],
-    )
-}
-
-/// The server failed in a way that clients cannot resolve.
-pub fn internal() -> Status {
-    status(
-        Code::Internal,
-        "INTERNAL",
-        "the server failed to do this; see its log",
-        [],
-    )
-}
-
 /// The status for a client that has not received a part of `what` within `limit`.
 pub(super) fn reader_too_slow(what: &str, limit: Duration) -> Status {
     let seconds = limit.as_secs();
@@ -269,29 +225,9 @@ pub(super) fn reader_too_slow(what: &str, limit: Duration) -> Status {
     )
 }
 
-/// The server is shutting down.
-pub fn shutting_down() -> Status {
-    status(
-        Code::Unavailable,
-        "SHUTTING_DOWN",
-        "the server is shutting down",
-        [],
-    )
-}
-
 /// No other node reaches this one, which therefore accepts nothing new.
 fn node_not_reached(message: &str) -> Status {
     status(Code::Unavailable, "NODE_NOT_REACHED", message, [])
-}
-
-/// A spectator was disconnected because it reads too slowly.
-pub fn spectator_too_slow() -> Status {
-    status(
-        Code::ResourceExhausted,
-        "SPECTATOR_TOO_SLOW",
-        "the stream was not read fast enough; watch again from the number after the last event received",
-        [],
-    )
 }
 
 /// The status for the end of a stream.
@@ -308,29 +244,8 @@ pub fn stream_ended(end: StreamEnd) -> Status {
     }
 }
 
-/// A room became unreachable: it has just ended, or was suspended because the server stops.
-pub fn room_gone() -> Status {
-    status(
-        Code::Unavailable,
-        "ROOM_GONE",
-        "the room cannot be reached here: it has just ended, the server is stopping, or it does not reach the one that has the room; connect again",
-        [],
-    )
-}
-
 /// Reason of [`not_owner`].
 const NOT_OWNER: &str = "NOT_OWNER";
-
-/// This node does not have what a request is about. Only nodes see it: the one that has passed the
-/// request on looks for the owner again.
-fn not_owner() -> Status {
-    status(
-        Code::Unavailable,
-        NOT_OWNER,
-        "another node has this room or tournament",
-        [],
-    )
-}
 
 /// What a request is about is at another node. `forward` sends the request there.
 pub fn elsewhere(elsewhere: Elsewhere) -> Status {
@@ -355,6 +270,11 @@ pub fn is_refusal(status: &Status) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason != NOT_OWNER)
 }
 
+/// A message sets no command.
+pub fn command_missing() -> Status {
+    invalid("COMMAND_MISSING", "command", "set a command")
+}
+
 /// The status for an error of a room; `unknown`: if it does not know the secret.
 pub fn room_failed<E>(unknown: fn() -> Status) -> impl FnOnce(RoomError<E>) -> Status
 where
@@ -365,16 +285,6 @@ where
         RoomError::SecretUnknown => unknown(),
         RoomError::Refused(error) => Refusal::from(error).into(),
     }
-}
-
-/// The node that has a room or tournament cannot be reached, or is just handing it over.
-pub fn owner_unreachable() -> Status {
-    status(
-        Code::Unavailable,
-        OWNER_UNREACHABLE,
-        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again",
-        [],
-    )
 }
 
 impl From<RoomGone> for Refusal {
@@ -491,51 +401,32 @@ impl From<MarkError> for Refusal {
             }
             MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
             MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
-            MarkError::Future => field(
-                MARKER_REFUSED,
-                &FieldProblem::new("elapsed_us", error.to_string()),
-            ),
+            MarkError::Future => invalid(MARKER_REFUSED, "elapsed_us", error.to_string()),
         })
     }
 }
 
-impl From<CreateError> for Refusal {
-    fn from(error: CreateError) -> Self {
-        Self(match error {
-            CreateError::TooMany(limit) => status(
-                Code::ResourceExhausted,
-                "TOO_MANY_ROOMS",
-                error.to_string(),
-                [("max_rooms", &limit.to_string())],
-            ),
-            CreateError::Refused(refused) => return refused.into(),
-            CreateError::RequestIdUsed => request_id_used(&error.to_string()),
-            CreateError::ShuttingDown => shutting_down(),
-            CreateError::NotReached => node_not_reached(&error.to_string()),
-            CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
-            CreateError::Store(error) => {
-                tracing::error!(%error, "creating a room failed");
-                store_failed()
-            }
-        })
-    }
-}
-
-/// A tournament or study was not created. `settings`: the status for a setting that is refused.
+/// A room, tournament or study was not created. `settings`: the status for a setting that is refused.
 pub fn not_created<P: std::error::Error>(
-    problem: CreateProblem<P>,
+    error: CreateError<P>,
     settings: impl FnOnce(P) -> Status,
 ) -> Status {
-    let message = problem.to_string();
-    match problem {
-        CreateProblem::Settings(problem) => settings(problem),
-        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
-        CreateProblem::RequestIdUsed(_) => request_id_used(&message),
-        CreateProblem::ShuttingDown(_) => shutting_down(),
-        CreateProblem::NotReached(_) => node_not_reached(&message),
-        CreateProblem::DiskNearlyFull => disk_nearly_full(&message),
-        CreateProblem::Store(error) => {
-            tracing::error!(%error, "creating a tournament or study failed");
+    let message = error.to_string();
+    match error {
+        CreateError::Settings(problem) => settings(problem),
+        CreateError::TooMany(limit) => status(
+            Code::ResourceExhausted,
+            "TOO_MANY_ROOMS",
+            message,
+            [("max_rooms", &limit.to_string())],
+        ),
+        CreateError::Refused(refused) => Refusal::from(refused).into(),
+        CreateError::RequestIdUsed => request_id_used(&message),
+        CreateError::ShuttingDown => shutting_down(),
+        CreateError::NotReached => node_not_reached(&message),
+        CreateError::DiskNearlyFull => disk_nearly_full(&message),
+        CreateError::Store(error) => {
+            tracing::error!(%error, "creating a room, tournament or study failed");
             store_failed()
         }
     }
@@ -554,8 +445,8 @@ impl From<ReportRefusal> for Refusal {
             ReportError::Refused(unjudged) => match unjudged {
                 TableRefusal::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
                 TableRefusal::ReservedQuestionId => {
-                    let problem = FieldProblem::new("question.question_id", error.to_string());
-                    return Self(field("REPORT_REFUSED", &problem));
+                    let name = "question.question_id";
+                    return Self(invalid("REPORT_REFUSED", name, error.to_string()));
                 }
                 TableRefusal::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
                 TableRefusal::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),

@@ -11,7 +11,6 @@ use chefshat_proto::codec::{LARGE, beside_tasks};
 use chefshat_proto::v1::{
     self, study_service_client::StudyServiceClient, study_service_server::StudyService,
 };
-use chefshat_record::convert::FieldProblem;
 use chefshat_study::{NewParticipants, Refusal as StudyRefusal, SettingsProblem};
 use prost::Message as _;
 use tokio::sync::mpsc;
@@ -19,15 +18,17 @@ use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
+use super::access::opened;
+use super::fields::{checked_name, request_id};
 use super::follow::{self, Responses, Sender, send};
 use super::forward::Gateway;
-use super::limits::{charged, make_way};
+use super::limits::make_way;
 use super::lists;
 use super::lookup::Lookup;
 use super::status::{
-    Refusal, field, internal, not_created, read_failed, request_id, shutting_down, status,
+    Refusal, internal, invalid, not_created, read_failed, shutting_down, status, study_unknown,
 };
-use chefshat_admission::access::{Caller, Role};
+use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named, short};
@@ -38,7 +39,7 @@ use chefshat_hosting::config::{
 };
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
-    CreateProblem, ExportError, ExportedFile, NotDeleted, NotDone, Studies, StudyHandle,
+    CreateError, ExportError, ExportedFile, NotDeleted, NotDone, Studies, StudyHandle,
 };
 use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
@@ -124,11 +125,10 @@ impl StudyCalls {
         id: &str,
         token: &str,
     ) -> Result<Arc<StudyHandle>, Status> {
-        let is_operator = caller.role == Role::Admin && caller.scope.is_none();
         let id = Id::parse(id).ok_or_else(study_unknown)?;
         let key = Key::of_caller(caller);
         let handle = self.here(id, key).await?.ok_or_else(study_unknown)?;
-        if handle.is_owner(token) || (is_operator && token.is_empty()) {
+        if handle.is_owner(token) || (caller.is_operator() && token.is_empty()) {
             return Ok(handle);
         }
         // As for rooms: one that does not exist is looked for at other nodes.
@@ -150,10 +150,9 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::CreateStudyRequest>,
     ) -> Result<Response<v1::CreateStudyResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         let gateway: Option<Gateway> = request.extensions().get().cloned();
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
         let settings = request.settings.unwrap_or_default();
         // Levels are a map: their order differs between encodings of the same settings.
         let content = beside_tasks(settings.encoded_len(), || content_of(&settings));
@@ -169,7 +168,7 @@ impl StudyService for StudyCalls {
         }
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.studies.create(settings, request_key, key).await;
-        if let (Err(CreateProblem::Store(StoreError::Taken(_))), Some(request)) =
+        if let (Err(CreateError::Store(StoreError::Taken(_))), Some(request)) =
             (&created, request_key)
         {
             // Another node has created it meanwhile.
@@ -187,13 +186,11 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::GetStudyRequest>,
     ) -> Result<Response<v1::GetStudyResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         make_way(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         let rooms = Arc::clone(self.studies.rooms());
         let described = move |handle: &StudyHandle| v1::GetStudyResponse {
             study: Some(handle.describe_with_pictures()),
@@ -206,18 +203,16 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::ListStudiesRequest>,
     ) -> Result<Response<v1::ListStudiesResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let gateway = request.extensions().get::<Gateway>().cloned();
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
         // Who waits for a turn holds up no other calls.
         make_way(request.extensions());
+        let (caller, request) = opened(request);
         // The settings of many studies are large.
-        let _turn = self.calls.list(charged(request.extensions())).await;
-        let request = request.into_inner();
-        let is_operator = caller.role == Role::Admin && caller.scope.is_none();
+        let _turn = self.calls.list(Key::of_caller(&caller)).await;
+        let is_operator = caller.is_operator();
         let tokens = &request.owner_tokens;
         if tokens.len() > 100 {
-            let problem = FieldProblem::new("owner_tokens", "give at most 100");
-            return Err(field("COUNT_REFUSED", &problem));
+            return Err(invalid("COUNT_REFUSED", "owner_tokens", "give at most 100"));
         }
         let studies = self
             .studies
@@ -249,23 +244,19 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::AddStudyParticipantsRequest>,
     ) -> Result<Response<v1::AddStudyParticipantsResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
-        let mut pseudonyms = Vec::new();
-        for pseudonym in &request.pseudonyms {
-            let pseudonym = convert::checked_name("pseudonyms", pseudonym, 1)
-                .map_err(|problem| field("NAME_REFUSED", &problem))?;
-            pseudonyms.push(pseudonym);
-        }
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
+        let pseudonyms = request.pseudonyms.iter();
+        let mut pseudonyms = pseudonyms
+            .map(|pseudonym| checked_name("pseudonyms", pseudonym, 1))
+            .collect::<Result<Vec<_>, _>>()?;
         let count = usize::try_from(request.count).unwrap_or(usize::MAX);
         let count = count.saturating_add(pseudonyms.len());
         if !(1..=MAX_STUDY_ADDED).contains(&count) {
             let words = format!("{count} participants; add 1 to {MAX_STUDY_ADDED} at a time");
-            return Err(field("COUNT_REFUSED", &FieldProblem::new("count", words)));
+            return Err(invalid("COUNT_REFUSED", "count", words));
         }
         pseudonyms.resize(count, String::new());
         let new = NewParticipants {
@@ -284,13 +275,11 @@ impl StudyService for StudyCalls {
         request: Request<v1::ListStudyLinksRequest>,
     ) -> Result<Response<v1::ListStudyLinksResponse>, Status> {
         use chefshat_study::Status::{Active, DroppedOut, Invited};
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         make_way(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         let links = |handle: &StudyHandle| {
             let numbers: Vec<u32> = handle.read(|study| {
                 let participants = study.participants().iter();
@@ -310,12 +299,10 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::FollowStudyRequest>,
     ) -> Result<Response<Self::FollowStudyStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         let what = "too many streams that follow studies";
         let place = follow::place(&self.followers, key, what)?;
         self.charge_all(&handle, key);
@@ -334,12 +321,10 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::RemoveStudyParticipantRequest>,
     ) -> Result<Response<v1::RemoveStudyParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         let removed = handle.remove(key, request.number, request.replace).await;
         let added = removed.map_err(not_done)?;
         Ok(Response::new(v1::RemoveStudyParticipantResponse {
@@ -352,11 +337,9 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::CloseStudyRequest>,
     ) -> Result<Response<v1::CloseStudyResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         handle.close().await.map_err(not_done)?;
         let study = Some(handle.describe());
         Ok(Response::new(v1::CloseStudyResponse { study }))
@@ -366,12 +349,10 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::ExportStudyRequest>,
     ) -> Result<Response<Self::ExportStudyStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let place = self.exports.take(key).await;
         let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
@@ -409,11 +390,9 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::DeleteStudyParticipantRequest>,
     ) -> Result<Response<v1::DeleteStudyParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         // The journal of the study is written again.
         self.calls
             .charge(Key::of_caller(&caller), COST_OF_TOURNAMENT);
@@ -431,11 +410,9 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::DeleteStudyRequest>,
     ) -> Result<Response<v1::DeleteStudyResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
-        let handle = self
-            .owned(&caller, &request.study_id, &request.owner_token)
-            .await?;
+        let (caller, request) = opened(request);
+        let (id, owner) = (&request.study_id, &request.owner_token);
+        let handle = self.owned(&caller, id, owner).await?;
         let deleted = self.studies.delete(handle, request.force).await;
         let (participants, games) = deleted.map_err(not_deleted)?;
         Ok(Response::new(v1::DeleteStudyResponse {
@@ -527,15 +504,6 @@ fn content_of(settings: &v1::StudySettings) -> Vec<u8> {
     content
 }
 
-fn study_unknown() -> Status {
-    status(
-        Code::NotFound,
-        "STUDY_UNKNOWN",
-        "this server has no study with this id and owner token",
-        [("field", "study_id")],
-    )
-}
-
 /// The status for a study that is not deleted.
 fn not_deleted(problem: NotDeleted) -> Status {
     match problem {
@@ -573,9 +541,7 @@ fn not_done(problem: NotDone) -> Status {
 fn refused(refusal: StudyRefusal) -> Status {
     let (code, reason) = code_of(&refusal);
     match &refusal {
-        StudyRefusal::PanelId(problem) => {
-            field(reason, &FieldProblem::new("panel_id", problem.clone()))
-        }
+        StudyRefusal::PanelId(problem) => invalid(reason, "panel_id", problem.clone()),
         StudyRefusal::Answers(problem) => {
             let item = problem.item.to_string();
             status(code, reason, refusal.to_string(), [("item", &item)])

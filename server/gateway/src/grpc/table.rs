@@ -7,6 +7,7 @@ use futures::{Stream, stream};
 use tokio::sync::watch;
 use tonic::{Request, Response, Status};
 
+use super::access::opened;
 use super::lookup::Lookup;
 use super::status::{room_failed, room_gone, table_unknown};
 use chefshat_admission::access::Caller;
@@ -42,8 +43,7 @@ impl TableService for TableCalls {
         &self,
         request: Request<v1::ReportRequest>,
     ) -> Result<Response<v1::ReportResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (room, secret) = self.find(&caller, &request.table_ticket).await?;
         let ruled = room.report(secret, request).await;
         let response = ruled.map_err(room_failed(table_unknown))?;
@@ -54,10 +54,8 @@ impl TableService for TableCalls {
         &self,
         request: Request<v1::TableServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let (room, secret) = self
-            .find(&caller, &request.into_inner().table_ticket)
-            .await?;
+        let (caller, request) = opened(request);
+        let (room, secret) = self.find(&caller, &request.table_ticket).await?;
         let watching = room.watch_table(secret).await;
         let states = watching.map_err(room_failed(table_unknown))?;
         Ok(Response::new(Box::pin(followed(states))))

@@ -14,17 +14,18 @@ use tokio_util::sync::CancellationToken;
 use tonic::transport::Channel;
 use tonic::{Code, Request, Response, Status};
 
-use super::access::check;
+use super::access::{check, opened};
+use super::fields::{checked_kind, checked_name, name_fingerprint, request_id};
 use super::follow::{self, Responses, compute_failed, follow};
 use super::forward::Gateway;
-use super::limits::{charged, make_way};
-use super::lists::{self, Listing, Page, Part};
+use super::limits::make_way;
+use super::lists::{self, Listing, Part};
 use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    Refusal, field, name_fingerprint, not_created, request_id, request_id_used, shutting_down,
-    status, ticket_unknown,
+    Refusal, field, kind_not_admitted, not_created, request_id_used, shutting_down, status,
+    ticket_unknown,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
@@ -34,7 +35,7 @@ use chefshat_hosting::config::{
     MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
 };
 use chefshat_hosting::tournaments::{
-    BeginRefusal, ByHand, ByHandRefusal, CreateProblem, Entry, JoinRefusal, Leaderboard, Newcomer,
+    BeginRefusal, ByHand, ByHandRefusal, CreateError, Entry, JoinRefusal, Leaderboard, Newcomer,
     Stopped, TableProblem, TournamentHandle, Tournaments, Who,
 };
 use chefshat_room::ids::{
@@ -43,7 +44,7 @@ use chefshat_room::ids::{
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
 use chefshat_store::StoreError;
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;
@@ -117,8 +118,8 @@ impl TournamentCalls {
         caller: &Caller,
         id: &str,
         join_code: &str,
-        key: Key,
     ) -> Result<Arc<TournamentHandle>, Status> {
+        let key = Key::of_caller(caller);
         self.calls.may_try_code(key).map_err(Refusal::from)?;
         let lookup = self.recorded.lookup();
         let found = match id {
@@ -207,17 +208,17 @@ impl Listing for TournamentList<'_> {
         service.list_tournaments(gateway.request(request)).await
     }
 
-    fn page(response: v1::ListTournamentsResponse) -> Page<v1::Tournament> {
-        Page {
-            entries: response.tournaments,
-            next_page_token: response.next_page_token,
-        }
+    fn page(response: v1::ListTournamentsResponse) -> (Vec<v1::Tournament>, String) {
+        (response.tournaments, response.next_page_token)
     }
 
-    fn response(page: Page<v1::Tournament>) -> v1::ListTournamentsResponse {
+    fn response(
+        tournaments: Vec<v1::Tournament>,
+        next_page_token: String,
+    ) -> v1::ListTournamentsResponse {
         v1::ListTournamentsResponse {
-            tournaments: page.entries,
-            next_page_token: page.next_page_token,
+            tournaments,
+            next_page_token,
         }
     }
 
@@ -237,28 +238,24 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CreateTournamentRequest>,
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
         let gateway: Option<Gateway> = request.extensions().get().cloned();
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
         let settings = request.settings.unwrap_or_default();
         let request_key = request_id(&request.request_id, &caller)?
             .map(|id| RequestKey::new(id, &settings.encode_to_vec()));
-        let name = convert::checked_name("name", &settings.name, 1)
-            .map_err(|problem| field("NAME_REFUSED", &problem))?;
-        let mut plan = convert::tournament_plan(&settings, random_bytes())
-            .map_err(|problem| refused(&problem))?;
-        convert::check_budget("filler", plan.core.filler).map_err(|problem| refused(&problem))?;
+        let name = checked_name("name", &settings.name, 1)?;
+        let mut plan = convert::tournament_plan(&settings, random_bytes()).map_err(refused)?;
+        convert::check_budget("filler", plan.core.filler).map_err(refused)?;
         for agent in &plan.built_in {
-            convert::check_budget("built_in_agents", *agent)
-                .map_err(|problem| refused(&problem))?;
+            convert::check_budget("built_in_agents", *agent).map_err(refused)?;
         }
         if let Some(problem) = too_long(&plan.rules) {
-            return Err(refused_within("rules", &problem));
+            return Err(refused_within("rules", problem));
         }
         let asked = settings.policy.unwrap_or_default();
         plan.policy.durability = supported_policy(&self.recorded, &asked)
-            .map_err(|problem| refused_within("policy", &problem))?
+            .map_err(|problem| refused_within("policy", problem))?
             .durability;
         convert::set_default_clock_of_models(&mut plan.policy, &asked);
         plan.policy
@@ -269,7 +266,7 @@ impl TournamentService for TournamentCalls {
             .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.tournaments.create(&name, plan, request_key, key).await;
-        if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
+        if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
             lookup.check_not_created_elsewhere(request_key, key).await?;
         }
@@ -285,15 +282,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentRequest>,
     ) -> Result<Response<v1::GetTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
+        let id = &request.tournament_id;
         let handle = match request.join_code.as_str() {
-            "" => self.find(&caller, &request.tournament_id).await?,
-            code => {
-                let id = &request.tournament_id;
-                self.find_by_code(&caller, id, code, key).await?
-            }
+            "" => self.find(&caller, id).await?,
+            code => self.find_by_code(&caller, id, code).await?,
         };
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
@@ -305,7 +298,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let (_, extensions, message) = request.into_parts();
-        let state = convert::tournament_state_from_proto("state", message.state)
+        let state = State::from_proto("state", message.state)
             .map_err(|problem| field("STATE_REFUSED", &problem))?;
         let listing = TournamentList {
             service: self,
@@ -321,16 +314,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::JoinTournamentRequest>,
     ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let request = request.into_inner();
-        let kind = convert::kind_from_proto("kind", request.kind)
-            .map_err(|problem| field("KIND_REFUSED", &problem))?
-            .unwrap_or(ParticipantKind::Agent);
+        let (caller, request) = opened(request);
+        let kind = checked_kind(request.kind)?.unwrap_or(ParticipantKind::Agent);
         let (id, code) = (&request.tournament_id, &request.join_code);
-        let handle = self.find_by_code(&caller, id, code, key).await?;
-        let name = convert::checked_name("name", &request.name, 1)
-            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let handle = self.find_by_code(&caller, id, code).await?;
+        let name = checked_name("name", &request.name, 1)?;
         if !handle.admits(kind) {
             return Err(kind_not_admitted());
         }
@@ -355,15 +343,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::AddTableParticipantRequest>,
     ) -> Result<Response<v1::AddTableParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
-        let kind = convert::kind_from_proto("kind", request.kind)
-            .map_err(|problem| field("KIND_REFUSED", &problem))?
-            .unwrap_or(ParticipantKind::Human);
-        let name = convert::checked_name("name", &request.name, 1)
-            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let kind = checked_kind(request.kind)?.unwrap_or(ParticipantKind::Human);
+        let name = checked_name("name", &request.name, 1)?;
         let entry = Entry {
             name,
             name_fingerprint: String::new(),
@@ -384,8 +368,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetPhysicalTableRequest>,
     ) -> Result<Response<v1::GetPhysicalTableResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         let game = index(request.game);
@@ -405,8 +388,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::StartTournamentRequest>,
     ) -> Result<Response<v1::StartTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         handle.begin().await.map_err(|refusal| {
@@ -425,8 +407,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CloseTournamentRequest>,
     ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         handle.close().await.map_err(stopped)?;
@@ -438,8 +419,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::WithdrawParticipantRequest>,
     ) -> Result<Response<v1::WithdrawParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let id = &request.tournament_id;
         let (handle, by) = self
             .find_by_ticket_or_owner(&caller, id, &request.ticket, &request.owner_token)
@@ -458,8 +438,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::RemoveParticipantRequest>,
     ) -> Result<Response<v1::RemoveParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         let what = ByHand::Remove {
@@ -474,8 +453,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::ReplaceParticipantRequest>,
     ) -> Result<Response<v1::ReplaceParticipantResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         let what = ByHand::Replace {
@@ -493,8 +471,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::PauseTournamentRequest>,
     ) -> Result<Response<v1::PauseTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         change(&handle, ByHand::SetPaused(true)).await?;
@@ -506,8 +483,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::ResumeTournamentRequest>,
     ) -> Result<Response<v1::ResumeTournamentResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         change(&handle, ByHand::SetPaused(false)).await?;
@@ -519,8 +495,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::PostponeGameRequest>,
     ) -> Result<Response<v1::PostponeGameResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let id = &request.tournament_id;
         let (handle, by) = self
             .find_by_ticket_or_owner(&caller, id, &request.ticket, &request.owner_token)
@@ -535,8 +510,7 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CallGameRequest>,
     ) -> Result<Response<v1::CallGameResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
         let game = index(request.game);
@@ -549,11 +523,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::FollowTournamentRequest>,
     ) -> Result<Response<Self::FollowTournamentStream>, Status> {
-        let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
-        let handle = self
-            .find(&caller, &request.into_inner().tournament_id)
-            .await?;
+        let (caller, request) = opened(request);
+        let key = Key::of_caller(&caller);
+        let handle = self.find(&caller, &request.tournament_id).await?;
         let what = "too many streams that follow tournaments";
         let place = follow::place(&self.followers, key, what)?;
         let permits = Arc::clone(&self.update_permits);
@@ -571,11 +543,9 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
-        let caller = Caller::of(request.extensions());
         make_way(request.extensions());
-        let handle = self
-            .find(&caller, &request.into_inner().tournament_id)
-            .await?;
+        let (caller, request) = opened(request);
+        let handle = self.find(&caller, &request.tournament_id).await?;
         let results = handle.results(&self.result_permits).await;
         let results = results.map_err(compute_failed)?.message.clone();
         Ok(Response::new(results))
@@ -585,16 +555,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::ListTournamentGamesRequest>,
     ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
-        let caller = Caller::of(request.extensions());
-        let request = request.into_inner();
+        let (caller, request) = opened(request);
         let handle = self.find(&caller, &request.tournament_id).await?;
         let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
-        let size = match request.page_size {
-            0 => DEFAULT_LINES,
-            size => size.min(MAX_GAMES_PAGE),
-        };
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let size = pages::size_within(request.page_size, DEFAULT_LINES, MAX_GAMES_PAGE);
         let mut games = handle.games(from, size + 1);
         let more = games.len() > size;
         games.truncate(size);
@@ -614,18 +579,14 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::GetLeaderboardResponse>, Status> {
         make_way(request.extensions());
         let request = request.into_inner();
-        convert::kind_from_proto("kind", request.kind)
-            .map_err(|problem| field("KIND_REFUSED", &problem))?;
-        let limit = match request.limit {
-            0 => DEFAULT_LINES,
-            limit => limit.min(MAX_LEADERBOARD_LINES),
-        };
+        checked_kind(request.kind)?;
+        let limit = pages::size_within(request.limit, DEFAULT_LINES, MAX_LEADERBOARD_LINES);
         let ratings = self.leaderboard.ratings().await.map_err(compute_failed)?;
         Ok(Response::new(convert::leaderboard(
             &ratings,
             request.kind(),
             request.min_games,
-            usize::try_from(limit).unwrap_or(usize::MAX),
+            limit,
         )))
     }
 }
@@ -635,31 +596,22 @@ pub(super) fn stopped(_: Stopped) -> Status {
 }
 
 /// The status for an invalid setting.
-fn refused(problem: &FieldProblem) -> Status {
+fn refused(problem: FieldProblem) -> Status {
     let reason = match problem.field {
         "rules" => "RULE_SET_REFUSED",
         "policy" => "POLICY_REFUSED",
         _ => "SETTINGS_REFUSED",
     };
-    field(reason, problem)
+    field(reason, &problem)
 }
 
 /// The status for an invalid field within a setting.
-fn refused_within(outer: &'static str, problem: &FieldProblem) -> Status {
-    refused(&FieldProblem::new(outer, problem.to_string()))
+fn refused_within(outer: &'static str, problem: FieldProblem) -> Status {
+    refused(FieldProblem::new(outer, problem.to_string()))
 }
 
 fn settings_refused(problem: SettingsProblem) -> Status {
-    refused(&FieldProblem::new(problem.field, problem.problem))
-}
-
-fn kind_not_admitted() -> Status {
-    status(
-        Code::FailedPrecondition,
-        "KIND_NOT_ADMITTED",
-        "this tournament does not admit this kind of participant",
-        [("field", "kind")],
-    )
+    refused(FieldProblem::new(problem.field, problem.problem))
 }
 
 fn join_refused(refusal: JoinRefusal) -> Status {
@@ -699,16 +651,14 @@ fn newcomer(
     caller: &Caller,
     request: &v1::ReplaceParticipantRequest,
 ) -> Result<Newcomer, Status> {
-    let agent = convert::agent_from_proto("built_in_agent", &request.built_in_agent)
-        .map_err(|problem| refused(&problem))?;
+    let agent =
+        convert::agent_from_proto("built_in_agent", &request.built_in_agent).map_err(refused)?;
     let shortest = usize::from(agent.is_none());
-    let name = convert::checked_name("name", &request.name, shortest)
-        .map_err(|problem| field("NAME_REFUSED", &problem))?;
+    let name = checked_name("name", &request.name, shortest)?;
     if let Some(agent) = agent {
-        convert::check_budget("built_in_agent", agent).map_err(|problem| refused(&problem))?;
+        convert::check_budget("built_in_agent", agent).map_err(refused)?;
         if handle.read(|core| core.settings().physical_tables) > 0 {
-            convert::check_real_cards("built_in_agent", agent)
-                .map_err(|problem| refused(&problem))?;
+            convert::check_real_cards("built_in_agent", agent).map_err(refused)?;
         }
         return Ok(Newcomer::BuiltIn {
             agent,
@@ -716,8 +666,7 @@ fn newcomer(
             request_id: request_id(&request.request_id, caller)?,
         });
     }
-    let kind = convert::kind_from_proto("kind", request.kind)
-        .map_err(|problem| field("KIND_REFUSED", &problem))?;
+    let kind = checked_kind(request.kind)?;
     let is_at_table = handle.read(|core| {
         let former = core.participants().get(index(request.participant));
         former.is_some_and(|former| former.at_table)

@@ -11,7 +11,6 @@ use chefshat_proto::v1::{
     vector_service_server::VectorService, vector_setup,
 };
 use chefshat_record::branch::{BranchError, branch_of};
-use chefshat_record::convert::FieldProblem;
 use chefshat_simulation::vector::{LEAVE_OPEN, Start, VectorGames, VectorSetup};
 use chefshat_vector::{
     Limits, Request as VectorRequest, batch_to_proto, record_parts, saved_to_proto,
@@ -29,7 +28,7 @@ use super::forward::Gateway;
 use super::limits::charged;
 use super::new_room::branch_refused;
 use super::recorded::Recorded;
-use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
+use super::status::{Refusal, internal, invalid, shutting_down, status, vector_refused};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_base::metrics::{Counted, Metrics, StreamKind};
@@ -167,7 +166,7 @@ impl Runner {
             Some(Some(RequestKind::Setup(message))) => message,
             Some(_) => {
                 let words = "the first message must be the setup of the games";
-                return Err(field("SETUP_MISSING", &FieldProblem::new("setup", words)).into());
+                return Err(invalid("SETUP_MISSING", "setup", words).into());
             }
         };
         let setup = self.setup(*message).await?;
@@ -235,11 +234,11 @@ impl Runner {
             Some(Some(RequestKind::Restore(message))) => Ok(VectorRequest::Restore(message)),
             Some(Some(RequestKind::Setup(_))) => {
                 let words = "the games are already set up; open another stream for others";
-                return Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into());
+                return Err(invalid("SETUP_REFUSED", "setup", words).into());
             }
             Some(None) => {
                 let words = "set a request: actions, reset, save or restore";
-                return Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into());
+                return Err(invalid("ACTIONS_REFUSED", "request", words).into());
             }
         };
         Ok(Some(Command::Next(request.map_err(vector_refused)?)))
@@ -305,7 +304,7 @@ impl Runner {
         point: &v1::BranchPoint,
         rules: Option<&v1::RuleSet>,
     ) -> Result<(RuleSet, Start), Status> {
-        let refused = |name, words: &str| field("BRANCH_REFUSED", &FieldProblem::new(name, words));
+        let refused = |name, words: &str| invalid("BRANCH_REFUSED", name, words);
         if rules.is_some_and(|rules| *rules != v1::RuleSet::default()) {
             let words = "leave it unset: the rules are those of the recorded game";
             return Err(refused("rules", words));

@@ -3,9 +3,10 @@
 //! was made before a deletion on this server is not shown at all.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::GameId;
 use tokio::sync::OnceCell;
 use tokio::time::Instant;
@@ -20,7 +21,7 @@ pub(super) type Key = (GameId, u64);
 #[derive(Debug)]
 pub(super) struct Cache<T> {
     most: usize,
-    entries: Mutex<BTreeMap<Key, Entry<T>>>,
+    entries: Lock<BTreeMap<Key, Entry<T>>>,
 }
 
 #[derive(Debug)]
@@ -41,13 +42,13 @@ impl<T: Clone> Cache<T> {
     pub(super) fn new(most: usize) -> Self {
         Self {
             most,
-            entries: Mutex::default(),
+            entries: Lock::default(),
         }
     }
 
     /// The value of a game, if it is kept.
     pub(super) fn find(&self, game: Key) -> Option<T> {
-        let entries = self.lock();
+        let entries = self.entries.lock();
         let made = entries.get(&game)?.value.get()?;
         (made.at.elapsed() < KEPT_FOR).then(|| made.value.clone())
     }
@@ -70,7 +71,7 @@ impl<T: Clone> Cache<T> {
     }
 
     fn join(&self, game: Key) -> Flight<'_, T> {
-        let mut entries = self.lock();
+        let mut entries = self.entries.lock();
         entries.retain(|_, entry| {
             let is_old = |made: &Made<T>| made.at.elapsed() >= KEPT_FOR;
             entry.waiting > 0 || !entry.value.get().is_some_and(is_old)
@@ -87,7 +88,7 @@ impl<T: Clone> Cache<T> {
 
     /// One of those that wait for a value has it, or has given up.
     fn leave(&self, game: Key) {
-        let mut entries = self.lock();
+        let mut entries = self.entries.lock();
         let Some(entry) = entries.get_mut(&game) else {
             return;
         };
@@ -103,10 +104,6 @@ impl<T: Clone> Cache<T> {
             };
             entries.remove(&game);
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<Key, Entry<T>>> {
-        (self.entries.lock()).expect("no code that holds this lock can panic")
     }
 }
 
@@ -176,7 +173,7 @@ mod tests {
             assert_eq!(value.await, Ok(number));
             tokio::time::advance(Duration::from_millis(1)).await;
         }
-        assert_eq!(cache.lock().len(), 2);
+        assert_eq!(cache.entries.lock().len(), 2);
         assert_eq!(cache.find(game(998)), Some(998));
         assert_eq!(cache.find(game(997)), None);
     }
@@ -198,6 +195,6 @@ mod tests {
         }
         let given_up = cache.get(game(3), pending::<Result<(), ()>>());
         assert!(given_up.now_or_never().is_none());
-        assert_eq!(cache.lock().len(), 1);
+        assert_eq!(cache.entries.lock().len(), 1);
     }
 }

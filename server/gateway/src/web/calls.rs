@@ -8,6 +8,17 @@ use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 use tower::{BoxError, Service};
 
+/// The services behind the page.
+pub(super) trait Services:
+    Service<Request<Body>, Response = Response<Body>, Error: Into<BoxError>>
+{
+}
+
+impl<S> Services for S where
+    S: Service<Request<Body>, Response = Response<Body>, Error: Into<BoxError>>
+{
+}
+
 /// Their origin.
 pub(super) fn own_origin() -> Uri {
     Uri::from_static("http://page")
@@ -19,11 +30,7 @@ pub(super) fn own_call<M>(extensions: &Extensions, message: M) -> tonic::Request
 }
 
 /// What the health service of gRPC says of the whole server.
-pub(super) async fn is_serving<S>(services: S, extensions: &Extensions) -> bool
-where
-    S: Service<Request<Body>, Response = Response<Body>>,
-    S::Error: Into<BoxError>,
-{
+pub(super) async fn is_serving(services: impl Services, extensions: &Extensions) -> bool {
     let mut health = HealthClient::with_origin(services, own_origin());
     let call = own_call(extensions, HealthCheckRequest::default());
     let answered = health.check(call).await;

@@ -12,22 +12,22 @@ mod preview;
 mod tests;
 
 use std::sync::Arc;
-use std::task::{Context, Poll};
 
 use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
 use http::{Method, Request, Response, header};
 use rayon::ThreadPoolBuildError;
 use tonic::body::Body;
-use tower::{BoxError, Layer, Service};
+use tower::{BoxError, Service};
 
 use answer::{DOCUMENT, absent, answer, busy, generated, health};
-use calls::is_serving;
+use calls::{Services, is_serving};
 use files::find;
 pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
 pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING};
 
+use crate::front::{Front, InFront, take_ready};
 use crate::grpc::within_share;
 use chefshat_admission::limits::CallLimits;
 use chefshat_hosting::config::PaintingSettings;
@@ -60,61 +60,34 @@ impl PageLayer {
         limits: Arc<CallLimits>,
         rooms: Arc<Rooms>,
         painter: Option<PaintingSettings>,
-    ) -> Result<Self, ThreadPoolBuildError> {
+    ) -> Result<InFront<Self>, ThreadPoolBuildError> {
         let previews = Arc::new(Previews::new(rooms, painter)?);
-        Ok(Self {
+        Ok(InFront(Self {
             tls,
             limits,
             previews,
-        })
+        }))
     }
 }
 
-impl<S> Layer<S> for PageLayer {
-    type Service = WithPage<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithPage {
-            layer: self.clone(),
-            services,
-        }
-    }
-}
-
-/// The services with the page in front of them.
-#[derive(Debug, Clone)]
-pub struct WithPage<S> {
-    layer: PageLayer,
-    services: S,
-}
-
-impl<S> Service<Request<Body>> for WithPage<S>
+impl<S> Front<S, Body> for PageLayer
 where
     S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
     S::Error: Into<BoxError>,
     S::Future: Send,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+    type Answering = Either<S::Future, BoxFuture<'static, Result<Response<Body>, S::Error>>>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<Body>) -> Self::Future {
+    fn answer(&self, services: &mut S, request: Request<Body>) -> Self::Answering {
         if !is_for_page(&request) {
-            return Either::Left(self.services.call(request));
+            return Either::Left(services.call(request));
         }
-        // The clone that is ready serves this request.
-        let clone = self.services.clone();
-        let services = std::mem::replace(&mut self.services, clone);
-        let page = self.layer.clone();
+        let (page, services) = (self.clone(), take_ready(services));
         let request = request.map(drop);
         Either::Right(Box::pin(async move {
             let extensions = request.extensions().clone();
             let method = request.method().clone();
-            let answer = with_body(page.answer(request, services).await);
+            let answer = with_body(page.page(request, services).await);
             let answer = within_share(&page.limits, &extensions, answer).await;
             Ok(answer.unwrap_or_else(|| with_body(busy(&method))))
         }))
@@ -126,11 +99,8 @@ fn with_body(answer: Response<Bytes>) -> Response<Body> {
 }
 
 impl PageLayer {
-    async fn answer<S>(&self, request: Request<()>, services: S) -> Response<Bytes>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    /// The answer to a request for the page.
+    async fn page(&self, request: Request<()>, services: impl Services) -> Response<Bytes> {
         let path = request.uri().path();
         match Link::of(path) {
             None if path == HEALTH => health(
@@ -143,11 +113,12 @@ impl PageLayer {
     }
 
     /// The answer to a request for the replay of a game or its picture.
-    async fn previewed<S>(&self, link: Link, services: S, request: &Request<()>) -> Response<Bytes>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    async fn previewed(
+        &self,
+        link: Link,
+        services: impl Services,
+        request: &Request<()>,
+    ) -> Response<Bytes> {
         let (previews, extensions) = (&self.previews, request.extensions());
         match link {
             Link::Picture(game) => match previews.picture(game, services, extensions).await {

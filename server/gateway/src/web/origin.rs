@@ -6,19 +6,19 @@
 
 use std::net::IpAddr;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 
 use axum::body::Body as Text;
 use futures::future::{BoxFuture, Either};
 use http::uri::Authority;
 use http::{HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
 use tonic::body::Body;
-use tower::{Layer, Service};
+use tower::Service;
 use tracing::info;
 
 use super::answer::busy;
 use super::with_body;
 use crate::connections::peer_address;
+use crate::front::{Front, InFront};
 use crate::grpc::within_share;
 use chefshat_admission::limits::{CallLimits, LogPace};
 
@@ -135,59 +135,35 @@ pub struct OriginLayer {
 
 impl OriginLayer {
     /// Creates a layer that admits these origins. `limits`: what holds each caller to its share.
-    pub fn new(origins: Origins, limits: Arc<CallLimits>) -> Self {
-        Self {
+    pub fn new(origins: Origins, limits: Arc<CallLimits>) -> InFront<Self> {
+        InFront(Self {
             origins: Arc::new(origins),
             limits,
-        }
+        })
     }
 }
 
-impl<S> Layer<S> for OriginLayer {
-    type Service = WithOrigin<S>;
-
-    fn layer(&self, services: S) -> Self::Service {
-        WithOrigin {
-            layer: self.clone(),
-            services,
-        }
-    }
-}
-
-/// The services behind the check of origins.
-#[derive(Debug, Clone)]
-pub struct WithOrigin<S> {
-    layer: OriginLayer,
-    services: S,
-}
-
-impl<S, B> Service<Request<B>> for WithOrigin<S>
+impl<S, B> Front<S, B> for OriginLayer
 where
     S: Service<Request<B>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: Send,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<BoxFuture<'static, Result<Self::Response, Self::Error>>, S::Future>;
+    type Answering = Either<BoxFuture<'static, Result<Response<Body>, S::Error>>, S::Future>;
 
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
-        let OriginLayer { origins, limits } = &self.layer;
+    fn answer(&self, services: &mut S, request: Request<B>) -> Self::Answering {
+        let Self { origins, limits } = self;
         match origins.check(&request) {
             // Answered before the limits of calls: it counts here.
             Ok(()) if request.method() == Method::OPTIONS => {
                 let (limits, extensions) = (Arc::clone(limits), request.extensions().clone());
-                let answering = self.services.call(request);
+                let answering = services.call(request);
                 Either::Left(Box::pin(async move {
                     let kept = within_share(&limits, &extensions, answering.await?).await;
                     Ok(kept.unwrap_or_else(|| with_body(busy(&Method::OPTIONS))))
                 }))
             }
-            Ok(()) => Either::Right(self.services.call(request)),
+            Ok(()) => Either::Right(services.call(request)),
             Err(foreign) => {
                 if origins.logged.admits() {
                     let address = peer_address(request.extensions());
@@ -238,7 +214,7 @@ mod tests {
     use std::convert::Infallible;
 
     use futures::FutureExt as _;
-    use tower::service_fn;
+    use tower::{Layer as _, service_fn};
 
     use super::*;
     use chefshat_admission::limits::calls::CALLS_AT_ONCE;

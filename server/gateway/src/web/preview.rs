@@ -17,20 +17,18 @@ use chefshat_record::jsonl;
 use chefshat_record::outcome::outcome;
 use chefshat_room::ids::{GameId, Id};
 use http::uri::{Authority, Scheme};
-use http::{Extensions, Request, Response, header};
+use http::{Extensions, Request, header};
 use prost::Message as _;
 use rayon::ThreadPoolBuildError;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::process::{Child, Command};
 use tokio::runtime::Handle;
 use tokio::time::timeout;
-use tonic::body::Body;
-use tower::{BoxError, Service};
 use tracing::warn;
 
 use super::answer::File;
 use super::cache::Cache;
-use super::calls::{own_call, own_origin};
+use super::calls::{Services, own_call, own_origin};
 use crate::connections::peer_address;
 use chefshat_admission::limits::{FairSemaphore, Key};
 use chefshat_base::threads::{Priority, Threads};
@@ -130,16 +128,12 @@ impl Previews {
     ///
     /// # Errors
     /// It is not shown.
-    pub(super) async fn picture<S>(
+    pub(super) async fn picture(
         &self,
         game: GameId,
-        services: S,
+        services: impl Services,
         extensions: &Extensions,
-    ) -> Result<File, Unshown>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    ) -> Result<File, Unshown> {
         let painter = self.painter.clone().ok_or(Unshown::Unknown)?;
         let (kept, patience) = (&self.pictures, painter.patience);
         let runtime = Handle::current();
@@ -161,16 +155,12 @@ impl Previews {
     ///
     /// # Errors
     /// It is not shown.
-    pub(super) async fn title<S>(
+    pub(super) async fn title(
         &self,
         game: GameId,
-        services: S,
+        services: impl Services,
         extensions: &Extensions,
-    ) -> Result<Title, Unshown>
-    where
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
-    {
+    ) -> Result<Title, Unshown> {
         let (kept, patience) = (&self.titles, DOCUMENT_PATIENCE);
         let ready = async |title| Some(title);
         (self.shown(kept, patience, game, services, extensions, title, ready)).await
@@ -182,12 +172,12 @@ impl Previews {
         clippy::too_many_arguments,
         reason = "the two callers differ in all of them"
     )]
-    async fn shown<M, T, S>(
+    async fn shown<M, T>(
         &self,
         kept: &Cache<T>,
         patience: Duration,
         game: GameId,
-        services: S,
+        services: impl Services,
         extensions: &Extensions,
         make: impl FnOnce(&[v1::RecordLine]) -> Option<M> + Send + 'static,
         finish: impl AsyncFnOnce(M) -> Option<T>,
@@ -195,8 +185,6 @@ impl Previews {
     where
         M: Send + 'static,
         T: Clone + Send + 'static,
-        S: Service<Request<Body>, Response = Response<Body>>,
-        S::Error: Into<BoxError>,
     {
         // A value that was made before names were deleted may show them.
         let now = (game, self.rooms.forgotten());
@@ -228,15 +216,11 @@ impl Previews {
 }
 
 /// The record of a game, if everybody may read it and it is not too long.
-async fn record<S>(
-    services: S,
+async fn record(
+    services: impl Services,
     game: GameId,
     extensions: &Extensions,
-) -> Option<Vec<v1::RecordLine>>
-where
-    S: Service<Request<Body>, Response = Response<Body>>,
-    S::Error: Into<BoxError>,
-{
+) -> Option<Vec<v1::RecordLine>> {
     let mut service = RecordServiceClient::with_origin(services, own_origin());
     let message = v1::GetRecordRequest {
         game_id: game.to_string(),

@@ -13,7 +13,7 @@ use prost::Message as _;
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
-use tower::service_fn;
+use tower::{Layer as _, service_fn};
 
 use super::*;
 use crate::connections::ForwardedClient;
@@ -72,14 +72,14 @@ impl Services {
 
 type Answer<'a> = Pin<Box<dyn Future<Output = Response<Body>> + 'a>>;
 
-fn get<'a>(page: &PageLayer, services: &Services, path: &str, caller: u8) -> Answer<'a> {
+fn get<'a>(page: &InFront<PageLayer>, services: &Services, path: &str, caller: u8) -> Answer<'a> {
     let mut request = Request::get(path).body(Body::empty()).expect("a request");
     let address: IpAddr = [192, 0, 2, caller].into();
     request.extensions_mut().insert(ForwardedClient(address));
     send(page, services, request)
 }
 
-fn send<'a>(page: &PageLayer, services: &Services, request: Request<Body>) -> Answer<'a> {
+fn send<'a>(page: &InFront<PageLayer>, services: &Services, request: Request<Body>) -> Answer<'a> {
     let services = services.clone();
     let mut page = page.layer(service_fn(move |_: Request<Body>| {
         services.clone().get_record().map(Ok::<_, BoxError>)
@@ -87,11 +87,11 @@ fn send<'a>(page: &PageLayer, services: &Services, request: Request<Body>) -> An
     async move { page.call(request).await.expect("an answer") }.boxed_local()
 }
 
-fn page() -> PageLayer {
+fn page() -> InFront<PageLayer> {
     page_of(&rooms())
 }
 
-fn page_of(rooms: &Arc<Rooms>) -> PageLayer {
+fn page_of(rooms: &Arc<Rooms>) -> InFront<PageLayer> {
     // Its picture is the record.
     let painter = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web/painter.sh");
     PageLayer::new(

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeSet;
 use std::future::Future;
-use std::sync::{Mutex, MutexGuard};
 
 use chefshat_cluster::NodeId;
 use chefshat_room::ids::UnitId;
@@ -11,6 +10,7 @@ use tokio::sync::{Notify, watch};
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 
+use chefshat_base::lock::Lock;
 use chefshat_store::StoreError;
 
 /// The lease of a node, as its rooms, tournaments and studies see it.
@@ -20,11 +20,11 @@ use chefshat_store::StoreError;
 #[derive(Debug)]
 pub struct NodeLease {
     until: watch::Sender<Instant>,
-    node: Mutex<Option<NodeId>>,
+    node: Lock<Option<NodeId>>,
     /// Whether another node has reached this one since it joined, or there was none. Until then it
     /// creates nothing and takes nothing over.
     reached: watch::Sender<bool>,
-    news: Mutex<BTreeSet<(UnitId, UnitEvent)>>,
+    news: Lock<BTreeSet<(UnitId, UnitEvent)>>,
     has_news: Notify,
 }
 
@@ -45,9 +45,9 @@ impl NodeLease {
     pub fn new() -> Self {
         Self {
             until: watch::Sender::new(Instant::now()),
-            node: Mutex::default(),
+            node: Lock::default(),
             reached: watch::Sender::default(),
-            news: Mutex::default(),
+            news: Lock::default(),
             has_news: Notify::new(),
         }
     }
@@ -81,12 +81,12 @@ impl NodeLease {
 
     /// The node, once it has joined.
     pub(crate) fn node(&self) -> Option<NodeId> {
-        *self.node.lock().expect("nothing panics under this lock")
+        *self.node.lock()
     }
 
     /// Sets the node, which has just joined.
     pub(crate) fn joined(&self, node: NodeId) {
-        *self.node.lock().expect("nothing panics under this lock") = Some(node);
+        *self.node.lock() = Some(node);
         self.reached.send_replace(false);
     }
 
@@ -139,23 +139,19 @@ impl NodeLease {
 
     /// Tells the task of the node about a unit.
     pub fn report(&self, unit: UnitId, news: UnitEvent) {
-        self.all_news().insert((unit, news));
+        self.news.lock().insert((unit, news));
         self.has_news.notify_one();
     }
 
     /// Waits until there is news, and returns it.
     pub(crate) async fn news(&self) -> BTreeSet<(UnitId, UnitEvent)> {
         loop {
-            let news = std::mem::take(&mut *self.all_news());
+            let news = std::mem::take(&mut *self.news.lock());
             if !news.is_empty() {
                 return news;
             }
             self.has_news.notified().await;
         }
-    }
-
-    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(UnitId, UnitEvent)>> {
-        (self.news.lock()).expect("nothing panics under this lock")
     }
 }
 

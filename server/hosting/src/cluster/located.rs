@@ -1,7 +1,7 @@
 //! The directory of a node: asks the database who owns what, and remembers what other nodes own.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 use std::time::Duration;
 
 use async_trait::async_trait;
@@ -12,6 +12,7 @@ use tracing::{debug, warn};
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
 use chefshat_admission::limits::{FairSemaphore, Key, Shares};
+use chefshat_base::lock::Lock;
 use chefshat_cluster::Load;
 use chefshat_room::ids::{RoomId, TournamentId};
 use chefshat_store::cluster::{self, ClusterStore, LivingNode, NodeId};
@@ -36,12 +37,12 @@ pub struct StoreDirectory {
     store: Arc<dyn ClusterStore>,
     lease: Arc<NodeLease>,
     /// Owners among the other nodes.
-    known: Mutex<BTreeMap<FoundBy, Peer>>,
+    known: Lock<BTreeMap<FoundBy, Peer>>,
     looking: Arc<FairSemaphore>,
     /// Nodes that could not be reached, and until when nothing new is for them.
-    avoided: Mutex<BTreeMap<Peer, Instant>>,
+    avoided: Lock<BTreeMap<Peer, Instant>>,
     /// The name of this node, as it was read last; empty before.
-    own: Mutex<Arc<str>>,
+    own: Lock<Arc<str>>,
     /// Locked while they are read, so that one request reads them for all.
     nodes: AsyncMutex<Option<Nodes>>,
 }
@@ -68,24 +69,12 @@ impl StoreDirectory {
         Self {
             store,
             lease,
-            known: Mutex::default(),
+            known: Lock::default(),
             looking: FairSemaphore::new(LOOKED_FOR_AT_ONCE, shares),
-            avoided: Mutex::default(),
-            own: Mutex::new(Arc::from("")),
+            avoided: Lock::default(),
+            own: Lock::new(Arc::from("")),
             nodes: AsyncMutex::default(),
         }
-    }
-
-    fn avoided(&self) -> MutexGuard<'_, BTreeMap<Peer, Instant>> {
-        (self.avoided.lock()).expect("nothing panics under this lock")
-    }
-
-    fn own(&self) -> MutexGuard<'_, Arc<str>> {
-        (self.own.lock()).expect("nothing panics under this lock")
-    }
-
-    fn known(&self) -> MutexGuard<'_, BTreeMap<FoundBy, Peer>> {
-        (self.known.lock()).expect("nothing panics under this lock")
     }
 
     /// Reads where something is.
@@ -174,7 +163,7 @@ impl Directory for StoreDirectory {
     }
 
     async fn locate(&self, found_by: &FoundBy, caller: Key) -> Location {
-        if let Some(peer) = self.known().get(found_by) {
+        if let Some(peer) = self.known.lock().get(found_by) {
             return Location::Node(peer.clone());
         }
         let read = timeout(LOOK_LIMIT, self.read(found_by, caller)).await;
@@ -190,7 +179,7 @@ impl Directory for StoreDirectory {
             }
         };
         if let Location::Node(peer) = &location {
-            let mut known = self.known();
+            let mut known = self.known.lock();
             if known.len() >= MAX_REMEMBERED {
                 known.clear();
             }
@@ -204,13 +193,13 @@ impl Directory for StoreDirectory {
         let own = self.lease.node().and_then(|node| nodes.remove(&node));
         let name = own.map_or_else(|| Arc::from(""), |own| own.node);
         if !name.is_empty() {
-            *self.own() = Arc::clone(&name);
+            *self.own.lock() = Arc::clone(&name);
         }
         (name, nodes.into_values().collect())
     }
 
     fn own_name(&self) -> Arc<str> {
-        Arc::clone(&self.own())
+        Arc::clone(&self.own.lock())
     }
 
     async fn place(&self, own: Load) -> Option<Peer> {
@@ -218,7 +207,7 @@ impl Directory for StoreDirectory {
         let own_node = self.lease.node()?;
         let now = Instant::now();
         let others: Vec<_> = {
-            let mut avoided = self.avoided();
+            let mut avoided = self.avoided.lock();
             avoided.retain(|_, until| now < *until);
             let is_other = |node: &NodeId| {
                 let peer = alive.nodes.get(node);
@@ -250,11 +239,12 @@ impl Directory for StoreDirectory {
     }
 
     fn avoid(&self, node: &Peer) {
-        self.avoided()
+        self.avoided
+            .lock()
             .insert(node.clone(), Instant::now() + AVOIDED_FOR);
     }
 
     fn forget(&self, found_by: &FoundBy) {
-        self.known().remove(found_by);
+        self.known.lock().remove(found_by);
     }
 }

@@ -14,7 +14,7 @@ mod unit;
 
 #[cfg(test)]
 pub(crate) use games::ROOMS_AT_ONCE;
+pub use registry::Registry;
 pub(crate) use registry::owner_of;
-pub use registry::{CreateProblem, Registry};
 pub(crate) use unit::New;
 pub use unit::{Folded, Handle, Journaled, Stopped, Unit, UnitHeader};

@@ -1,6 +1,6 @@
 //! All units of a kind on this server: creates each once, finds, stops and forgets them.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use tokio::sync::Notify;
 use tokio_util::task::TaskTracker;
@@ -10,41 +10,16 @@ use super::actor::{self, Stop};
 use super::table::Table;
 use super::unit::{Handle, Journaled, New, Unit, UnitHeader as _};
 use crate::cluster::UnitEvent;
-use crate::rooms::Rooms;
-use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
+use crate::rooms::{CreateError, Rooms};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit};
+use chefshat_base::lock::Lock;
 use chefshat_base::tasks::{named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, UnitId, normal_code};
-use chefshat_store::units::{StoredKind as _, StoredUnit, UnitKind, UnitRow, UnitWrite};
+use chefshat_store::units::{StoredKind as _, StoredUnit, UnitRow, UnitWrite};
 use chefshat_store::{StoreError, units_of};
 
-/// Why a unit was not created. `P`: why its settings are refused.
-#[derive(Debug, thiserror::Error)]
-pub enum CreateProblem<P: std::error::Error> {
-    /// A setting is invalid.
-    #[error(transparent)]
-    Settings(P),
-    /// Its creator, or the server, has too many.
-    #[error(transparent)]
-    Refused(#[from] Refused),
-    /// The request id was used for another unit of this kind.
-    #[error("this request id was used to create another {0}; draw a new one")]
-    RequestIdUsed(UnitKind),
-    /// The server is shutting down.
-    #[error("the server is shutting down and accepts no new {}", .0.plural())]
-    ShuttingDown(UnitKind),
-    /// No other node reaches this one.
-    #[error("no other node reaches this one, which accepts no new {}; try again, and if it fails again, tell the operator", .0.plural())]
-    NotReached(UnitKind),
-    /// The disk has no space for more games.
-    #[error("the server's disk is nearly full; the rest is reserved for running games")]
-    DiskNearlyFull,
-    /// The store failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-}
-
 /// Why a unit of this kind was not created.
-type Problem<U> = CreateProblem<<U as Journaled>::SettingsProblem>;
+type Problem<U> = CreateError<<U as Journaled>::SettingsProblem>;
 
 /// The owner token of what a request creates: repetitions have the same.
 pub(crate) fn owner_of<T>(request: Option<RequestKey>) -> Token<T> {
@@ -57,7 +32,7 @@ pub struct Registry<U: Journaled> {
     pub(crate) tracker: TaskTracker,
     pub(crate) common: U::Common,
     stop: Stop,
-    table: Mutex<Table<U>>,
+    table: Lock<Table<U>>,
     /// Notified when the creation of a unit has ended.
     created: Notify,
     places: Arc<FairSemaphore>,
@@ -78,7 +53,7 @@ impl<U: Journaled> Registry<U> {
             tracker,
             common,
             stop: Stop::default(),
-            table: Mutex::default(),
+            table: Lock::default(),
             created: Notify::new(),
             places,
         })
@@ -95,14 +70,14 @@ impl<U: Journaled> Registry<U> {
     /// They are not.
     fn check_accepting(&self) -> Result<(), Problem<U>> {
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
-            return Err(CreateProblem::ShuttingDown(U::KIND));
+            return Err(CreateError::ShuttingDown);
         }
         if !self.rooms.is_reached() {
-            return Err(CreateProblem::NotReached(U::KIND));
+            return Err(CreateError::NotReached);
         }
         match self.rooms.store().has_space() {
             true => Ok(()),
-            false => Err(CreateProblem::DiskNearlyFull),
+            false => Err(CreateError::DiskNearlyFull),
         }
     }
 
@@ -124,7 +99,7 @@ impl<U: Journaled> Registry<U> {
             if let Some(handle) = self.get(owner.subject) {
                 return match handle.is_owner(&owner.to_text()) {
                     true => Ok(handle),
-                    false => Err(CreateProblem::RequestIdUsed(U::KIND)),
+                    false => Err(CreateError::RequestIdUsed),
                 };
             }
             match Reservation::of(self, owner.subject.unit(), charged)? {
@@ -234,7 +209,7 @@ impl<U: Journaled> Registry<U> {
         let rows = new.folded.rows;
         let (handle, inbox) = Handle::new(new, charged, stop.end.clone());
         U::enter(&handle, &self.rooms);
-        self.lock().enter(Arc::clone(&handle));
+        self.table.lock().enter(Arc::clone(&handle));
         if !handle.is_over() {
             let unit = Unit::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
             let running = actor::run(U::new(unit, &self.common), inbox, stop);
@@ -245,7 +220,7 @@ impl<U: Journaled> Registry<U> {
 
     /// Whether this unit runs here, or is being created.
     pub(crate) fn runs(&self, unit: UnitId) -> bool {
-        let table = self.lock();
+        let table = self.table.lock();
         let running = |handle: &Arc<Handle<U>>| !handle.is_stopped();
         table.get(unit).is_some_and(running) || table.is_in_creation(unit)
     }
@@ -261,7 +236,7 @@ impl<U: Journaled> Registry<U> {
     pub async fn stop_one(&self, unit: UnitId) {
         loop {
             let created = self.created.notified();
-            if !self.lock().is_in_creation(unit) {
+            if !self.table.lock().is_in_creation(unit) {
                 break;
             }
             created.await;
@@ -278,7 +253,7 @@ impl<U: Journaled> Registry<U> {
 
     /// Removes a unit from memory.
     pub(crate) fn forget_one(&self, id: Id<U::Kind>) {
-        self.lock().remove_id(id.unit());
+        self.table.lock().remove_id(id.unit());
     }
 
     /// Stops beginning and counting games; those that end from here on count when the server is
@@ -299,23 +274,19 @@ impl<U: Journaled> Registry<U> {
 
     /// The unit with this id, if it is of this kind.
     pub fn by_unit(&self, unit: UnitId) -> Option<Arc<Handle<U>>> {
-        self.lock().get(unit).cloned()
+        self.table.lock().get(unit).cloned()
     }
 
     /// The unit with this join code.
     pub fn by_code(&self, code: &str) -> Option<Arc<Handle<U>>> {
-        self.lock().by_code(&normal_code(code)).cloned()
+        self.table.lock().by_code(&normal_code(code)).cloned()
     }
 
     /// The units created before number `before`, or all; with their numbers, newest first.
     pub fn earlier(&self, before: Option<u64>) -> Vec<(u64, Arc<Handle<U>>)> {
-        (self.lock().earlier(before))
+        (self.table.lock().earlier(before))
             .map(|(number, handle)| (number, Arc::clone(handle)))
             .collect()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Table<U>> {
-        (self.table.lock()).expect("no code that holds this lock can panic")
     }
 }
 
@@ -337,7 +308,7 @@ impl<U: Journaled> Reservation<U> {
         charged: Key,
     ) -> Result<Option<Self>, Problem<U>> {
         let accepting = registry.check_accepting();
-        let mut table = registry.lock();
+        let mut table = registry.table.lock();
         if table.is_in_creation(id) || table.get(id).is_some() {
             return Ok(None);
         }
@@ -366,7 +337,7 @@ impl<U: Journaled> Reservation<U> {
 
 impl<U: Journaled> Drop for Reservation<U> {
     fn drop(&mut self) {
-        self.registry.lock().release(self.id);
+        self.registry.table.lock().release(self.id);
         self.registry.created.notify_waiters();
     }
 }

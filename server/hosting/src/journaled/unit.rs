@@ -1,7 +1,7 @@
 //! A unit, as everything here knows it: what each kind decides, its value as stored and in memory, its
 //! handle, and what its task has.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, MutexGuard};
 use std::time::Duration;
 
 use tokio::sync::{Notify, mpsc, oneshot, watch};
@@ -11,6 +11,7 @@ use tracing::warn;
 
 use crate::rooms::{CreateError, Rooms};
 use chefshat_admission::limits::{Key, Permit, Refused};
+use chefshat_base::lock::Lock;
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, Token};
 use chefshat_store::StoreError;
@@ -157,7 +158,7 @@ pub struct Handle<U: Journaled> {
     pub(crate) charged: Key,
     pub(crate) shared: U::Shared,
     /// The state with only committed entries.
-    committed: Mutex<U::State>,
+    committed: Lock<U::State>,
     pub(crate) mailbox: mpsc::Sender<U::Message>,
     /// Cancelled when its task ends.
     pub(crate) end: CancellationToken,
@@ -184,7 +185,7 @@ impl<U: Journaled> Handle<U> {
             plan: folded.plan,
             charged,
             shared,
-            committed: Mutex::new(folded.state),
+            committed: Lock::new(folded.state),
             mailbox,
             end,
             changes: watch::Sender::new(0),
@@ -250,7 +251,7 @@ impl<U: Journaled> Handle<U> {
 
     /// The state with only committed entries.
     pub(crate) fn committed(&self) -> MutexGuard<'_, U::State> {
-        (self.committed.lock()).expect("no code that holds this lock can panic")
+        self.committed.lock()
     }
 
     /// Sends a message to the task, and waits for its answer.

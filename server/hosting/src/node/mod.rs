@@ -25,6 +25,7 @@ use tracing::{error, info, warn};
 pub use units::Hosted;
 
 use crate::cluster::{NodeLease, UnitEvent};
+use chefshat_base::clock::millis;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_room::ids::UnitId;
 use chefshat_store::StoreError;
@@ -265,7 +266,7 @@ impl Task {
     }
 
     fn now_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        millis(self.began.elapsed())
     }
 
     fn put_in(&mut self, input: Input<UnitId>) {

@@ -62,8 +62,7 @@ impl TestNode {
             }
         });
         started.reaching = Some(AbortOnDropHandle::new(reaching));
-        let mut serves = started.node.serves();
-        soon(serves.wait_for(|it| *it)).await.expect("it runs");
+        started.serves().await;
         started
     }
 
@@ -122,6 +121,12 @@ impl TestNode {
         }
     }
 
+    /// Waits until it serves clients.
+    async fn serves(&self) {
+        let mut serves = self.node.serves();
+        soon(serves.wait_for(|it| *it)).await.expect("it runs");
+    }
+
     /// Whether its metrics have this line.
     fn shows(&self, line: &str) -> bool {
         self.rooms.metrics().text().lines().any(|it| it == line)
@@ -157,6 +162,16 @@ impl TestNode {
     async fn has_tournament(&self, id: TournamentId) -> Arc<TournamentHandle> {
         found(|| self.tournaments.get(id)).await
     }
+}
+
+/// Two nodes on a database.
+async fn two_nodes() -> (Arc<Database>, TestNode, TestNode) {
+    let database = Database::new();
+    let (first, second) = (
+        TestNode::start(&database).await,
+        TestNode::start(&database).await,
+    );
+    (database, first, second)
 }
 
 async fn soon<T>(future: impl Future<Output = T>) -> T {
@@ -203,9 +218,7 @@ async fn names(room: &Handle) -> Vec<String> {
 
 #[tokio::test(start_paused = true)]
 async fn the_room_of_a_dead_node_continues_at_another() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, first, second) = two_nodes().await;
     let room = first.create_room().await;
     soon(join(&room, "Ada")).await.expect("it runs");
     let id = room.id();
@@ -291,9 +304,7 @@ async fn a_node_that_joins_gets_its_share_of_the_rooms() {
 
 #[tokio::test(start_paused = true)]
 async fn rooms_that_were_handed_over_come_back_at_once_from_a_node_that_leaves() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let mut second = TestNode::start(&database).await;
+    let (_database, first, mut second) = two_nodes().await;
     for _ in 0..20 {
         first.create_room().await;
     }
@@ -331,9 +342,7 @@ async fn a_full_node_takes_over_what_nobody_else_does() {
 
 #[tokio::test(start_paused = true)]
 async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, first, second) = two_nodes().await;
     let mut rooms = Vec::new();
     for _ in 0..3 * LOADS_AT_ONCE {
         rooms.push(first.create_room().await.id());
@@ -353,9 +362,7 @@ async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
 
 #[tokio::test(start_paused = true)]
 async fn a_node_that_returns_too_late_publishes_nothing() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, first, second) = two_nodes().await;
     let old = first.create_room().await;
     let id = old.id();
     first.store.cut_off.send_replace(true);
@@ -371,9 +378,7 @@ async fn a_node_that_returns_too_late_publishes_nothing() {
     assert_eq!(late, Err(RoomGone));
     first.store.cut_off.send_replace(false);
     first.loses(id).await;
-    soon(first.node.serves().wait_for(|it| *it))
-        .await
-        .expect("it runs");
+    first.serves().await;
     assert_eq!(database.seated(id), ["Bo"]);
     assert_eq!(names(&new).await, ["Bo"]);
 }
@@ -438,9 +443,7 @@ async fn a_beat_without_an_answer_costs_no_lease() {
 
 #[tokio::test(start_paused = true)]
 async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_beat() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (_database, first, second) = two_nodes().await;
     let room = first.create_room().await.id();
     second.store.loads_held.send_replace(true);
     drop(first);
@@ -504,24 +507,18 @@ async fn a_database_that_was_away_for_long_ends_no_node() {
 
 #[tokio::test(start_paused = true)]
 async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (_database, first, second) = two_nodes().await;
     let room = second.create(Durability::Ephemeral).await;
     first.store.cut_off.send_replace(true);
     second.store.cut_off.send_replace(true);
     sleep(Duration::from_secs(300)).await;
     first.store.cut_off.send_replace(false);
-    soon(first.node.serves().wait_for(|it| *it))
-        .await
-        .expect("it runs");
+    first.serves().await;
     // Within the time that is left to the other nodes.
     sleep(Duration::from_secs(3)).await;
     second.store.cut_off.send_replace(false);
     soon(join(&room, "Ada")).await.expect("it continues");
-    soon(second.node.serves().wait_for(|it| *it))
-        .await
-        .expect("it runs");
+    second.serves().await;
     soon(join(&room, "Bo")).await.expect("it continues");
 
     // The other node continues, so it removes the room.
@@ -534,9 +531,7 @@ async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node
 
 #[tokio::test(start_paused = true)]
 async fn a_node_that_was_removed_joins_again() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, first, second) = two_nodes().await;
     let room = first.create_room().await.id();
     let before = first.store.node();
     first.store.cut_off.send_replace(true);
@@ -545,9 +540,7 @@ async fn a_node_that_was_removed_joins_again() {
     assert!(!database.knows(before));
     first.store.cut_off.send_replace(false);
 
-    soon(first.node.serves().wait_for(|it| *it))
-        .await
-        .expect("it runs");
+    first.serves().await;
     assert_ne!(first.store.node(), before);
     let created = first.create_room().await.id();
     assert_eq!(database.owner(created), Some(first.store.node()));
@@ -589,9 +582,7 @@ async fn a_node_whose_work_panics_goes_on() {
 
 #[tokio::test(start_paused = true)]
 async fn a_node_that_is_removed_while_it_hands_over_has_left() {
-    let database = Database::new();
-    let mut first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, mut first, second) = two_nodes().await;
     let room = first.create_room().await.id();
     first.store.cut_off.send_replace(true);
     second.has(room).await;
@@ -616,9 +607,7 @@ async fn a_node_that_is_removed_while_it_hands_over_has_left() {
 
 #[tokio::test(start_paused = true)]
 async fn a_drained_node_hands_over_and_leaves() {
-    let database = Database::new();
-    let mut first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, mut first, second) = two_nodes().await;
     let mut rooms = Vec::new();
     for _ in 0..20 {
         let room = first.create_room().await;
@@ -648,9 +637,7 @@ async fn a_drained_node_hands_over_and_leaves() {
 
 #[tokio::test(start_paused = true)]
 async fn a_room_that_a_node_cannot_resume_is_left_to_others() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (database, first, second) = two_nodes().await;
     let room = first.create_room().await.id();
     database.make_foreign(room);
     drop(first);
@@ -701,9 +688,7 @@ fn entry(name: &str, at_table: bool) -> Entry {
 
 #[tokio::test(start_paused = true)]
 async fn a_tournament_changes_hands_with_its_rooms() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (_database, first, second) = two_nodes().await;
     let settings = v1::TournamentSettings {
         format: v1::TournamentFormat::Swiss.into(),
         rounds: 1,
@@ -733,9 +718,7 @@ async fn a_tournament_changes_hands_with_its_rooms() {
 
 #[tokio::test(start_paused = true)]
 async fn a_participant_who_comes_when_its_tournament_stops_reconnects() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (_database, first, second) = two_nodes().await;
     let settings = v1::TournamentSettings {
         format: v1::TournamentFormat::Swiss.into(),
         ..Default::default()
@@ -787,9 +770,7 @@ async fn the_end_of_a_game_is_shown_although_its_answer_comes_after_the_next_bea
 
 #[tokio::test(start_paused = true)]
 async fn the_end_of_a_game_is_read_once_for_all_who_ask_when_its_node_is_gone() {
-    let database = Database::new();
-    let first = TestNode::start(&database).await;
-    let second = TestNode::start(&database).await;
+    let (_database, first, second) = two_nodes().await;
     let room = first.create_room().await;
     soon(join(&room, "Ada")).await.expect("it runs");
     room.close_without_token().await;

@@ -1,14 +1,15 @@
 //! The units that a node runs: resumes, stops and suspends their rooms, tournaments and studies.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
 
 use tracing::{info, warn};
 
 use crate::rooms::Rooms;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::UnitId;
 use chefshat_store::StoreError;
@@ -55,7 +56,7 @@ pub(super) struct Units {
     /// How long ephemeral games may continue when the node hands over.
     grace: Duration,
     /// The units that are to run here, with their epochs.
-    wanted: Mutex<BTreeMap<UnitId, Epoch>>,
+    wanted: Lock<BTreeMap<UnitId, Epoch>>,
     loads: Semaphore,
     /// How many units are being resumed.
     resuming: AtomicUsize,
@@ -74,7 +75,7 @@ impl Units {
             rooms,
             tournaments,
             studies,
-            wanted: Mutex::default(),
+            wanted: Lock::default(),
             loads: Semaphore::new(LOADS_AT_ONCE),
             resuming: AtomicUsize::new(0),
         }
@@ -134,12 +135,12 @@ impl Units {
 
     /// From here on, a unit is to run here at this epoch.
     pub(super) fn want(&self, unit: UnitId, epoch: Epoch) {
-        self.wanted().insert(unit, epoch);
+        self.wanted.lock().insert(unit, epoch);
     }
 
     /// From here on, a unit is not to run here.
     pub(super) fn unwant(&self, unit: UnitId) {
-        self.wanted().remove(&unit);
+        self.wanted.lock().remove(&unit);
     }
 
     /// Prevents a unit from publishing anything from here on. It ends with [`Units::stop`].
@@ -148,10 +149,6 @@ impl Units {
         self.tournaments.fence(unit);
         self.studies.fence(unit);
         self.rooms.fence_unit(unit);
-    }
-
-    fn wanted(&self) -> MutexGuard<'_, BTreeMap<UnitId, Epoch>> {
-        (self.wanted.lock()).expect("nothing panics under this lock")
     }
 
     /// Whether a unit runs here, or is being created.
@@ -178,7 +175,7 @@ impl Units {
         self.metrics().taken_over();
         let _resuming = Counted::new(&self.resuming);
         self.stop(unit).await;
-        while self.wanted().get(&unit) == Some(&epoch) {
+        while self.wanted.lock().get(&unit) == Some(&epoch) {
             match self.read(unit, epoch).await {
                 Ok(resumed) => return resumed,
                 Err(error) => {
@@ -227,7 +224,7 @@ impl Units {
     /// Releases a unit that cannot be resumed here, as long as it is wanted. Returns whether the
     /// database knows.
     pub(super) async fn give_up(&self, unit: UnitId, epoch: Epoch) -> bool {
-        while self.wanted().get(&unit) == Some(&epoch) {
+        while self.wanted.lock().get(&unit) == Some(&epoch) {
             if self.release(unit, epoch, None).await {
                 self.unwant(unit);
                 return true;

@@ -16,7 +16,7 @@ use chefshat_base::clock::since_epoch_ms;
 use chefshat_store::samples::Samples;
 use chefshat_store::studies::StoredStudy;
 use chefshat_store::{StoreError, units_of};
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 
 impl ParticipantData {
     /// Whether a participant of this name has a game of a study that is not over.
@@ -88,7 +88,7 @@ impl ParticipantData {
             let Some(participant) = study.participant(number) else {
                 continue;
             };
-            let state = convert::participant_state(participant.status);
+            let state = participant.status.to_proto();
             let consent = participant.consent.as_ref().map(|consent| {
                 json!({
                     "atMs": consent.at_ms,

@@ -1,8 +1,8 @@
 //! The handle of a room: sends messages to its mailbox and returns the answers.
 
 use std::convert::Infallible;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use chefshat_engine::Seat;
@@ -21,6 +21,7 @@ use super::table_view::SentState;
 use super::task::{self, Room, TaskContext};
 use chefshat_admission::limits::{Hint, Key, Payer};
 use chefshat_base::clock::RoomClock;
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::RoomId;
 use chefshat_room::journal::AbortReason;
 use chefshat_room::{
@@ -37,7 +38,7 @@ pub struct Handle {
     fence: CancellationToken,
     clock: RoomClock,
     sharing: Arc<AtomicU32>,
-    next_join_code: Arc<Mutex<String>>,
+    next_join_code: Arc<Lock<String>>,
 }
 
 /// Spectators who share a stream of a room at another node; they count until it is dropped.
@@ -263,15 +264,13 @@ impl Handle {
 
     /// The join code of the room in which the participants play again; empty if there is none.
     pub fn next_join_code(&self) -> String {
-        let code = self.next_join_code.lock();
-        code.unwrap_or_else(PoisonError::into_inner).clone()
+        self.next_join_code.lock().clone()
     }
 
     /// Sets the join code of the room in which the participants play again, if it is still this one.
     /// Returns whether it was.
     pub fn replace_next_join_code(&self, earlier: &str, join_code: String) -> bool {
-        let code = self.next_join_code.lock();
-        let mut code = code.unwrap_or_else(PoisonError::into_inner);
+        let mut code = self.next_join_code.lock();
         let is_earlier = *code == earlier;
         if is_earlier {
             *code = join_code;

@@ -1,11 +1,12 @@
 //! The markers of a room for the streams that follow them.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_room::Core;
 use tokio::sync::watch::{self, error::RecvError};
 
+use chefshat_base::lock::Lock;
 use chefshat_wire::convert;
 
 /// Most streams that follow the markers of one room.
@@ -16,7 +17,7 @@ const MARKERS_PER_MESSAGE: usize = 256;
 /// The markers that have been published.
 #[derive(Debug)]
 pub(super) struct MarkerLog {
-    markers: Arc<Mutex<Vec<v1::Marker>>>,
+    markers: Arc<Lock<Vec<v1::Marker>>>,
     published: watch::Sender<Published>,
 }
 
@@ -50,7 +51,7 @@ impl MarkerLog {
         };
         self.published.send_if_modified(|last| {
             let new = core.markers().iter().enumerate().skip(last.count);
-            lock(&self.markers)
+            (self.markers.lock())
                 .extend(new.map(|(index, marker)| convert::marker_to_proto(index, marker)));
             let modified = *last != published;
             *last = published;
@@ -72,7 +73,7 @@ impl MarkerLog {
 /// Follows the markers of a room.
 #[derive(Debug)]
 pub struct MarkerFollower {
-    markers: Arc<Mutex<Vec<v1::Marker>>>,
+    markers: Arc<Lock<Vec<v1::Marker>>>,
     published: watch::Receiver<Published>,
     position: usize,
 }
@@ -87,7 +88,7 @@ impl MarkerFollower {
             let published = *self.published.borrow_and_update();
             if self.position < published.count {
                 let end = published.count.min(self.position + MARKERS_PER_MESSAGE);
-                let markers = lock(&self.markers)[self.position..end].to_vec();
+                let markers = self.markers.lock()[self.position..end].to_vec();
                 self.position = end;
                 return Ok(Some(markers));
             }
@@ -97,10 +98,4 @@ impl MarkerFollower {
             self.published.changed().await?;
         }
     }
-}
-
-fn lock(markers: &Mutex<Vec<v1::Marker>>) -> MutexGuard<'_, Vec<v1::Marker>> {
-    markers
-        .lock()
-        .expect("no code that holds this lock can panic")
 }

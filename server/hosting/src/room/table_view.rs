@@ -9,6 +9,7 @@ use chefshat_proto::v1::{self, table_report::Kind};
 use chefshat_room::Core;
 use tokio::sync::watch;
 
+use chefshat_base::clock::millis;
 use chefshat_wire::convert;
 
 /// Most streams that follow one table.
@@ -56,7 +57,7 @@ impl TableView {
                 return false;
             }
             // Later states have higher versions, also across a restart of the server.
-            let elapsed_ms = u64::try_from(now.as_millis()).unwrap_or(u64::MAX);
+            let elapsed_ms = millis(now);
             state.version = elapsed_ms.max(last.version + 1);
             *last = Arc::new(state);
             true

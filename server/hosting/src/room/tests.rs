@@ -34,8 +34,8 @@ use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT};
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
-use chefshat_wire::outbox::StreamEnd;
-use chefshat_wire::outbox::{Outbox, OutboxStream};
+use chefshat_wire::encoded::Updates;
+use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
 
 struct NullWatcher;
 
@@ -46,6 +46,14 @@ impl RoomWatcher for NullWatcher {
 
 /// The owner's secret.
 const OWNER: [u8; 32] = [9; 32];
+/// The policy of a game that goes on without its players.
+fn never_aborted() -> Policy {
+    Policy {
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    }
+}
+
 /// A seat that anybody may take.
 const FREE: Fill = Fill::Open { reserved_for: None };
 
@@ -215,11 +223,21 @@ async fn attach(room: &Handle, ticket: RoomToken) -> AttachedSeat {
 }
 
 async fn attach_from(room: &Handle, ticket: RoomToken, charged: Key) -> AttachedSeat {
+    attach_with(room, ticket, |attachment| {
+        attachment.charged = charged.into()
+    })
+    .await
+}
+
+/// Attaches a seat with a changed request.
+async fn attach_with(
+    room: &Handle,
+    ticket: RoomToken,
+    change: impl FnOnce(&mut AttachRequest),
+) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
-    let attachment = AttachRequest {
-        charged: charged.into(),
-        ..attachment(&ticket, outbox)
-    };
+    let mut attachment = attachment(&ticket, outbox);
+    change(&mut attachment);
     let attached = room.attach(attachment).await.expect("a valid ticket");
     AttachedSeat {
         seat: attached.seat,
@@ -231,11 +249,19 @@ async fn attach_from(room: &Handle, ticket: RoomToken, charged: Key) -> Attached
 
 /// The next updates of a seat.
 async fn received(seat: &mut AttachedSeat) -> Option<impl Iterator<Item = Update> + use<>> {
-    let updates = seat.updates.next().await?;
+    seat.updates.next().await.map(decoded)
+}
+
+/// The next updates of a seat, if they wait.
+fn waiting(updates: &mut OutboxStream) -> Option<impl Iterator<Item = Update> + use<>> {
+    updates.next().now_or_never().flatten().map(decoded)
+}
+
+fn decoded(updates: Result<Updates, StreamEnd>) -> impl Iterator<Item = Update> + use<> {
     let written = updates.expect("no error").encode_to_vec();
     let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
     let updates = response.updates.into_iter();
-    Some(updates.map(|update| update.update.expect("an update")))
+    updates.map(|update| update.update.expect("an update"))
 }
 
 /// Reads until the end of the game; answers decisions with their first legal action if `answering`.
@@ -297,10 +323,7 @@ fn first_legal(decision: &v1::DecisionRequest) -> u32 {
 #[tokio::test(start_paused = true)]
 async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     // So long that its events neither fit an outbox nor are all kept.
-    let policy = Policy {
-        abort: AbortPolicy::Never,
-        ..Policy::default()
-    };
+    let policy = never_aborted();
     let room = room(policy, 30).await;
     let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
@@ -320,16 +343,8 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     let late = read(&room, &mut late, false).await;
     assert!(late.0.ends_with(last) && late.1 == 0);
     let from = expected.len() - MAX_EVENTS_KEPT;
-    let (outbox, updates) = Outbox::new();
-    let mut attachment = attachment(&stalled.ticket, outbox);
-    attachment.options.from = from;
-    let attached = room.attach(attachment).await.expect("a valid ticket");
-    let mut later = AttachedSeat {
-        seat: attached.seat,
-        connection: attached.connection,
-        ticket: stalled.ticket,
-        updates,
-    };
+    let later = attach_with(&room, stalled.ticket, |it| it.options.from = from);
+    let mut later = later.await;
     let (numbers, snapshots) = read(&room, &mut later, false).await;
     assert!(numbers == expected[from..] && snapshots == 0);
     // And a spectator, whom no snapshot could tell the result.
@@ -339,10 +354,7 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
 
 #[tokio::test(start_paused = true)]
 async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
-    let policy = Policy {
-        abort: AbortPolicy::Never,
-        ..Policy::default()
-    };
+    let policy = never_aborted();
     let room = room(policy, 1_000).await;
     let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
@@ -379,18 +391,22 @@ async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
     assert!(snapshot.observation.is_some() && snapshot.next_sequence > next);
 }
 
-/// What a spectator receives who asks for all events: a snapshot, or else the first events.
-async fn watched_from_the_beginning(room: &Handle) -> (Option<v1::Snapshot>, Vec<v1::GameEvent>) {
-    let (outbox, mut watched) = Outbox::new();
+/// The stream of a spectator who asks for all events.
+async fn spectate(room: &Handle, charged: Key) -> Result<OutboxStream, RoomError<SpectateError>> {
+    let (outbox, watched) = Outbox::new();
     let request = SpectateRequest {
         outbox,
         from: 0,
         snapshot: false,
         is_owner: false,
-        charged: Key::Local,
+        charged,
     };
-    let spectating = room.spectate(request).await;
-    spectating.expect("spectators are admitted");
+    room.spectate(request).await.map(|()| watched)
+}
+
+/// What a spectator receives who asks for all events: a snapshot, or else the first events.
+async fn watched_from_the_beginning(room: &Handle) -> (Option<v1::Snapshot>, Vec<v1::GameEvent>) {
+    let mut watched = spectate(room, Key::Local).await.expect("admitted");
     loop {
         let message = watched.next().await.expect("a message").expect("no error");
         let message = v1::SpectatorServiceWatchResponse::decode(message.encode_to_vec().as_slice());
@@ -448,10 +464,7 @@ async fn a_seat_that_is_given_up_in_the_batch_of_its_attachment_is_not_attached(
 
 #[tokio::test(start_paused = true)]
 async fn deadlines_fire_without_any_input() {
-    let policy = Policy {
-        abort: AbortPolicy::Never,
-        ..Policy::default()
-    };
+    let policy = never_aborted();
     let begun = Instant::now();
     let room = room(policy, 1).await;
     let mut seats = take_all_seats(&room).await;
@@ -468,10 +481,7 @@ async fn deadlines_fire_without_any_input() {
 
 /// What one seat's stream received: its first update of this kind.
 async fn update<T>(seat: &mut AttachedSeat, wanted: impl Fn(Update) -> Option<T>) -> T {
-    while let Some(updates) = seat.updates.next().await {
-        let written = updates.expect("no error").encode_to_vec();
-        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
-        let mut updates = response.updates.into_iter().filter_map(|it| it.update);
+    while let Some(mut updates) = received(seat).await {
         if let Some(found) = updates.find_map(&wanted) {
             return found;
         }
@@ -499,8 +509,7 @@ async fn a_pause_of_the_process_costs_a_seat_no_time() {
         let policy = Policy {
             decision_time: 2 * SECOND,
             bank: Duration::ZERO,
-            abort: AbortPolicy::Never,
-            ..Policy::default()
+            ..never_aborted()
         };
         let built_in = Fill::BuiltIn("greedy".parse().expect("an agent"));
         let mut fills = vec![built_in; 4];
@@ -547,9 +556,8 @@ async fn a_flood_stops_neither_the_clock_nor_searches() {
     let policy = Policy {
         decision_time: Duration::from_millis(50),
         bank: Duration::ZERO,
-        abort: AbortPolicy::Never,
         max_timeouts: 1,
-        ..Policy::default()
+        ..never_aborted()
     };
     let searcher = "monte_carlo:200:random".parse().expect("an agent");
     let fills = vec![FREE, FREE, FREE, Fill::BuiltIn(searcher)];
@@ -590,10 +598,7 @@ async fn a_flood_stops_neither_the_clock_nor_searches() {
 
 #[tokio::test(start_paused = true)]
 async fn a_full_outbox_has_space_for_the_last_update() {
-    let policy = Policy {
-        abort: AbortPolicy::Never,
-        ..Policy::default()
-    };
+    let policy = never_aborted();
     let room = room(policy, 30).await;
     let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
@@ -601,12 +606,10 @@ async fn a_full_outbox_has_space_for_the_last_update() {
     played.await;
     let newer = attach(&room, stalled.ticket).await;
     let mut last = None;
-    while let Some(Some(updates)) = futures::FutureExt::now_or_never(stalled.updates.next()) {
-        let written = updates.expect("no error").encode_to_vec();
-        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
-        last = response.updates.into_iter().last();
+    while let Some(updates) = waiting(&mut stalled.updates) {
+        last = updates.last();
     }
-    let Some(Update::Detached(detached)) = last.and_then(|update| update.update) else {
+    let Some(Update::Detached(detached)) = last else {
         panic!("it was not notified that a newer connection has its seat");
     };
     assert_eq!(detached.reason(), v1::DetachReason::Superseded);
@@ -661,35 +664,21 @@ impl Journal for PanicsAfter {
 #[tokio::test]
 async fn one_caller_cannot_take_all_places_of_spectators() {
     let room = room_with(Policy::default(), 1, |journal| journal).await;
-    let watch = async |outbox, charged| {
-        let request = SpectateRequest {
-            outbox,
-            from: 0,
-            snapshot: false,
-            is_owner: false,
-            charged,
-        };
-        room.spectate(request).await
-    };
     let mut streams = Vec::new();
     let full = loop {
-        let (outbox, stream) = Outbox::new();
-        match watch(outbox, Key::Local).await {
-            Ok(()) => streams.push(stream),
+        match spectate(&room, Key::Local).await {
+            Ok(stream) => streams.push(stream),
             Err(error) => break error,
         }
     };
     assert_eq!(full, RoomError::Refused(SpectateError::Full));
     assert_eq!(streams.len(), MAX_SPECTATORS / 2);
-    let (outbox, _stream) = Outbox::new();
     let other = Key::Address([192, 0, 2, 1].into());
-    watch(outbox, other).await.expect("another caller");
+    let _other = spectate(&room, other).await.expect("another caller");
     // Those who leave make room, also if nothing happens in the game.
     streams.clear();
-    let (outbox, _stream) = Outbox::new();
-    watch(outbox, Key::Local)
-        .await
-        .expect("the others have left");
+    let again = spectate(&room, Key::Local).await;
+    drop(again.expect("the others have left"));
 }
 
 #[tokio::test(start_paused = true)]
@@ -710,16 +699,7 @@ async fn check_streams_end_after_panic(at_once: bool) {
     })
     .await;
     let mut seats = take_all_seats(&room).await;
-    let (outbox, mut watched) = Outbox::new();
-    room.spectate(SpectateRequest {
-        outbox,
-        from: 0,
-        snapshot: false,
-        is_owner: false,
-        charged: Key::Local,
-    })
-    .await
-    .expect("spectators are admitted");
+    let mut watched = spectate(&room, Key::Local).await.expect("admitted");
     for seat in &seats {
         for action in 0..u32::from(u8::MAX) {
             let answer = Answer::new(1, action);
@@ -808,10 +788,7 @@ async fn a_game_that_cannot_be_read_back_ends_unsigned() {
             },
         );
         let room = room.await;
-        let mut seats = Vec::new();
-        for _ in 0..4 {
-            seats.push(take_seat(&room).await);
-        }
+        let mut seats = take_all_seats(&room).await;
         let reads = seats.iter_mut().map(|seat| read(&room, seat, true));
         futures::future::join_all(reads).await;
         assert_eq!(signed.get(), Some(&is_signed));
@@ -829,11 +806,9 @@ async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_em
         let mut decisions = Vec::new();
         let mut is_over = false;
         for seat in &mut seats {
-            while let Some(Some(updates)) = seat.updates.next().now_or_never() {
-                let written = updates.expect("no error").encode_to_vec();
-                let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
-                for update in response.updates {
-                    match update.update.expect("an update") {
+            while let Some(updates) = waiting(&mut seat.updates) {
+                for update in updates {
+                    match update {
                         Update::Decision(decision) => {
                             decisions.push((seat.seat, seat.connection, decision));
                         }
@@ -896,12 +871,7 @@ async fn a_flood_of_annotations_drops_those_of_its_sender_alone() {
         for seat in &mut seats {
             let (seat, connection, updates) = (seat.seat, seat.connection, &mut seat.updates);
             tokio::task::yield_now().await;
-            let Some(Some(updates)) = updates.next().now_or_never() else {
-                continue;
-            };
-            let written = updates.expect("no error").encode_to_vec();
-            let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
-            for update in response.updates.into_iter().filter_map(|it| it.update) {
+            for update in waiting(updates).into_iter().flatten() {
                 match update {
                     Update::Decision(decision) => {
                         let answer = Answer {
@@ -992,13 +962,9 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
                 ..JoinRequest::for_tests(format!("player {index}"))
             });
             let joined = joined.await.expect("a free seat");
-            let (outbox, updates) = Outbox::new();
-            let attachment = AttachRequest {
-                charged: connected.map_or(of(address(100)), |them| them[index as usize]),
-                ..attachment(&joined.ticket, outbox)
-            };
-            let attached = room.attach(attachment).await;
-            seats.push((attached.expect("a valid ticket"), updates));
+            let charged = connected.map_or(of(address(100)), |them| them[index as usize]);
+            let attached = attach_with(&room, joined.ticket, |it| it.charged = charged);
+            seats.push(attached.await);
         }
         while room.describe().await.expect("shown").state() != v1::RoomState::Playing {
             tokio::time::sleep(Duration::from_millis(5)).await;

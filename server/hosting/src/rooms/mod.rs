@@ -10,7 +10,7 @@ mod unit;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use chefshat_record::signature::PublicKey;
@@ -27,6 +27,7 @@ use crate::signing::Signer;
 use crate::webhooks::Webhooks;
 use chefshat_admission::limits::{Background, FairSemaphore, Key, NotStored, Searches, Shares};
 use chefshat_base::clock::ProcessClock;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::{GameId, RoomId, SeriesId, TournamentId, UnitId, normal_code};
 use chefshat_room::journal::{GameHeader, TournamentGame};
@@ -50,10 +51,10 @@ pub enum Withheld {
 
 /// The rooms of a server.
 pub struct Rooms {
-    table: Mutex<Table>,
+    table: Lock<Table>,
     /// Series of games with the same deals that are not finished, and tournaments all of whose
     /// games are withheld.
-    closed: Mutex<BTreeSet<Withheld>>,
+    closed: Lock<BTreeSet<Withheld>>,
     /// Notified when a game has ended or a room is gone.
     changed: Notify,
     /// Notified when the creation of a room has ended.
@@ -115,8 +116,8 @@ impl Rooms {
             .map(|settings| Webhooks::new(settings, Arc::clone(&metrics)))
             .unwrap_or_default();
         Ok(Arc::new_cyclic(|rooms: &Weak<Self>| Self {
-            table: Mutex::default(),
-            closed: Mutex::default(),
+            table: Lock::default(),
+            closed: Lock::default(),
             changed: Notify::new(),
             created: Notify::new(),
             forgotten: AtomicU64::new(0),
@@ -350,7 +351,7 @@ impl Rooms {
     /// Withholds the records of a series, or of all games of a tournament, or releases them once
     /// all have ended.
     pub fn withhold(&self, games: Withheld, withheld: bool) {
-        let mut closed = self.closed();
+        let mut closed = self.closed.lock();
         if withheld {
             closed.insert(games);
         } else {
@@ -360,14 +361,10 @@ impl Rooms {
 
     /// Whether the record of a game is withheld.
     pub fn is_withheld(&self, game: TournamentGame) -> bool {
-        let closed = self.closed();
+        let closed = self.closed.lock();
         let series = game.series.map(Withheld::Series);
         closed.contains(&Withheld::Tournament(game.tournament))
             || series.is_some_and(|series| closed.contains(&series))
-    }
-
-    fn closed(&self) -> MutexGuard<'_, BTreeSet<Withheld>> {
-        (self.closed.lock()).expect("no code that holds this lock can panic")
     }
 
     /// Number of rooms in which a game is running or waiting to start.

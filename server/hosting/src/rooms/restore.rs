@@ -15,7 +15,7 @@ use tracing::{error, info, warn};
 use super::{Entry, Rooms};
 use crate::room::spawn_room;
 use chefshat_admission::limits::Key;
-use chefshat_base::clock::{RoomClock, since_epoch_ms};
+use chefshat_base::clock::{RoomClock, millis, since_epoch_ms};
 use chefshat_room::Core;
 use chefshat_room::ids::GameId;
 use chefshat_room::journal::Fill;
@@ -29,8 +29,7 @@ impl Rooms {
     /// # Errors
     /// The store failed.
     pub async fn restore(&self) -> Result<usize, StoreError> {
-        let retention = u64::try_from(self.context.retention.as_millis()).unwrap_or(u64::MAX);
-        let ended_since_ms = since_epoch_ms().saturating_sub(retention);
+        let ended_since_ms = since_epoch_ms().saturating_sub(millis(self.context.retention));
         // Before any room could write its record at the same time. Other servers that only write
         // records may share the folder.
         if self.context.store.outlives_server()

@@ -1,35 +1,40 @@
 //! The table of rooms, in the order of their creation, with look-up by id and join code.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::convert::Infallible;
 use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, MutexGuard};
 
 use tokio::sync::Notify;
 
 use crate::room::{GameEnd, Handle};
 use chefshat_admission::limits::{Permit, Refused};
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::{GameId, RoomId, UnitId};
 use chefshat_room::journal::GameHeader;
 use chefshat_store::StoreError;
 
-/// Why no room was created.
+/// Why no room, tournament or study was created. `P`: why its settings are refused.
 #[derive(Debug, thiserror::Error)]
-pub enum CreateError {
+pub enum CreateError<P: std::error::Error = Infallible> {
+    /// A setting is invalid.
+    #[error(transparent)]
+    Settings(P),
     /// The limit of rooms is reached.
     #[error("the server already has {0} rooms; close one or try later")]
     TooMany(usize),
-    /// Its creator has too many rooms.
+    /// Its creator, or the server, has too many.
     #[error(transparent)]
     Refused(#[from] Refused),
-    /// The request id was used for another room.
-    #[error("this request id was used to create another room; draw a new one")]
+    /// The request id was used for something else.
+    #[error("this request id was used to create something else; draw a new one")]
     RequestIdUsed,
     /// The server is shutting down.
-    #[error("the server is shutting down and accepts no new rooms")]
+    #[error("the server is shutting down and accepts nothing new")]
     ShuttingDown,
     /// No other node reaches this one.
     #[error(
-        "no other node reaches this one, which accepts no new rooms; try again, and if it fails again, tell the operator"
+        "no other node reaches this one, which accepts nothing new; try again, and if it fails again, tell the operator"
     )]
     NotReached,
     /// The disk has no space for more games.
@@ -67,11 +72,8 @@ pub(super) struct Table {
 pub(super) struct LockedTable<'a>(Option<MutexGuard<'a, Table>>);
 
 impl<'a> LockedTable<'a> {
-    pub(super) fn new(table: &'a Mutex<Table>) -> Self {
-        let locked = table.lock();
-        Self(Some(
-            locked.expect("no code that holds this lock can panic"),
-        ))
+    pub(super) fn new(table: &'a Lock<Table>) -> Self {
+        Self(Some(table.lock()))
     }
 }
 

@@ -3,7 +3,7 @@
 //! their own.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_proto::cost::{Cost, shapes};
@@ -12,6 +12,7 @@ use chefshat_study::{Device, DeviceSession, ItemAnswer, Participant, Study};
 use prost::Message as _;
 
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::StudyId;
 
 /// When it is worth trying again to create a study, or to add to one.
@@ -24,9 +25,9 @@ const OVERHEAD_OF_ANSWERS: usize = 256;
 pub(super) struct StudyData {
     /// One place is one byte.
     budget: Arc<FairSemaphore>,
-    participants: Mutex<Vec<Permit>>,
+    participants: Lock<Vec<Permit>>,
     /// By number of the participant.
-    answers: Mutex<BTreeMap<u32, Answers>>,
+    answers: Lock<BTreeMap<u32, Answers>>,
 }
 
 /// The memory of the answers, devices and traces of a participant.
@@ -63,8 +64,8 @@ impl StudyData {
             (*number, answers)
         });
         Self {
-            answers: Mutex::new(answers.collect()),
-            participants: Mutex::new(Vec::from_iter((bytes > 0).then(|| take(bytes)))),
+            answers: Lock::new(answers.collect()),
+            participants: Lock::new(Vec::from_iter((bytes > 0).then(|| take(bytes)))),
             budget: Arc::clone(budget),
         }
     }
@@ -107,20 +108,18 @@ impl StudyData {
 
     /// Keeps the memory of a device or of traces of a participant.
     pub(super) fn keep(&self, number: u32, held: Permit) {
-        let mut answers = self.lock_answers();
+        let mut answers = self.answers.lock();
         answers.entry(number).or_default().others.push(held);
     }
 
     /// Keeps the memory of participants that were added.
     pub(super) fn keep_participants(&self, held: Permit) {
-        (self.participants.lock())
-            .expect("no code that holds this lock can panic")
-            .push(held);
+        self.participants.lock().push(held);
     }
 
     /// Keeps the memory of answers that a participant gave, and no longer that of those it had saved.
     pub(super) fn keep_answers(&self, number: u32, held: Permit) {
-        let mut answers = self.lock_answers();
+        let mut answers = self.answers.lock();
         let answers = answers.entry(number).or_default();
         answers.given.push(held);
         answers.saved = None;
@@ -128,12 +127,12 @@ impl StudyData {
 
     /// Keeps the memory of answers that a participant saved, in place of those it had saved before.
     pub(super) fn keep_saved_answers(&self, number: u32, held: Permit) {
-        self.lock_answers().entry(number).or_default().saved = Some(held);
+        self.answers.lock().entry(number).or_default().saved = Some(held);
     }
 
     /// Gives the memory of a participant's answers and devices back.
     pub(super) fn forget_answers(&self, number: u32) {
-        let forgotten = self.lock_answers().remove(&number);
+        let forgotten = self.answers.lock().remove(&number);
         drop(forgotten);
     }
 
@@ -148,10 +147,6 @@ impl StudyData {
             limit: self.budget.share_of(key) as u64,
             retry_after: RETRY_STUDIES,
         }
-    }
-
-    fn lock_answers(&self) -> MutexGuard<'_, BTreeMap<u32, Answers>> {
-        (self.answers.lock()).expect("no code that holds this lock can panic")
     }
 }
 

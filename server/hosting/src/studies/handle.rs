@@ -1,9 +1,8 @@
 //! The handle of one study: what others can read of it, and messages to its task.
 
-use std::collections::BTreeMap;
 use std::slice;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, MutexGuard};
 
 use bytes::Bytes;
 use chefshat_proto::v1;
@@ -560,7 +559,7 @@ impl StudyHandle {
 
     /// Counts the changes of a participant's view.
     pub fn view_changes(&self, number: u32) -> watch::Receiver<u64> {
-        let mut views = self.lock_views();
+        let mut views = self.shared.views.lock();
         let sender = views.entry(number).or_insert_with(|| watch::Sender::new(0));
         sender.subscribe()
     }
@@ -582,7 +581,7 @@ impl StudyHandle {
 
     /// Notifies the streams of a participant.
     pub(super) fn notify_participant(&self, number: u32) {
-        if let Some(sender) = self.lock_views().get(&number) {
+        if let Some(sender) = self.shared.views.lock().get(&number) {
             sender.send_modify(|count| *count += 1);
         }
     }
@@ -590,15 +589,7 @@ impl StudyHandle {
     /// Whether the file system has refused to delete a participant's data; `None` if they are not being
     /// deleted.
     fn deletion_failed(&self, number: u32) -> Option<bool> {
-        self.lock_deleting().get(&number).copied()
-    }
-
-    pub(super) fn lock_deleting(&self) -> MutexGuard<'_, BTreeMap<u32, bool>> {
-        (self.shared.deleting.lock()).expect("no code that holds this lock can panic")
-    }
-
-    fn lock_views(&self) -> MutexGuard<'_, BTreeMap<u32, watch::Sender<u64>>> {
-        (self.shared.views.lock()).expect("no code that holds this lock can panic")
+        self.shared.deleting.lock().get(&number).copied()
     }
 
     async fn command(

@@ -24,8 +24,8 @@ pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, NotDone, Presence, StudyHandle,
 pub use message::NotDeleted;
 
 use crate::config::{MAX_STUDY_DATA, MAX_STUDY_MEMORY};
-use crate::journaled::{self, Folded, Journaled as _, New, Registry, Stopped, owner_of};
-use crate::rooms::Rooms;
+use crate::journaled::{Folded, Journaled as _, New, Registry, Stopped, owner_of};
+use crate::rooms::{self, Rooms};
 use chefshat_admission::limits::{FairSemaphore, Key, Refused};
 use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_base::tasks::short;
@@ -39,7 +39,7 @@ use task::StudyTask;
 pub(crate) use task::restored;
 
 /// Why a study was not created.
-pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;
+pub type CreateError = rooms::CreateError<SettingsProblem>;
 
 /// The studies of a server.
 pub type Studies = Registry<StudyTask>;
@@ -74,19 +74,19 @@ impl Studies {
     /// Creates a study. Returns it with its owner token.
     ///
     /// # Errors
-    /// See [`CreateProblem`].
+    /// See [`CreateError`].
     pub async fn create(
         self: &Arc<Self>,
         settings: v1::StudySettings,
         request: Option<RequestKey>,
         charged: Key,
-    ) -> Result<(Arc<StudyHandle>, StudyToken), CreateProblem> {
+    ) -> Result<(Arc<StudyHandle>, StudyToken), CreateError> {
         let durable = self.rooms.store().outlives_server();
         // Long settings take milliseconds to check.
         let checking = tokio::task::spawn_blocking(move || check(settings, durable));
         let checked = (checking.await)
             .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
-            .map_err(CreateProblem::Settings)?;
+            .map_err(CreateError::Settings)?;
         let owner: StudyToken = owner_of(request);
         let owner = Token {
             subject: shortened(owner.subject),
@@ -102,11 +102,11 @@ impl Studies {
         checked: Checked,
         owner: StudyToken,
         charged: Key,
-    ) -> Result<New<StudyTask>, CreateProblem> {
+    ) -> Result<New<StudyTask>, CreateError> {
         // A repeated request for a study that there is does not come here.
         let deletes_at_ms = checked.plan.core.deletes_at_ms;
         if deletes_at_ms.is_some_and(|at_ms| at_ms <= (self.common.now)()) {
-            return Err(CreateProblem::Settings(SettingsProblem {
+            return Err(CreateError::Settings(SettingsProblem {
                 field: "deletes_at_ms".to_owned(),
                 problem: "this time has passed".to_owned(),
             }));

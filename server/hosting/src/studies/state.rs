@@ -1,14 +1,15 @@
 //! What is shared besides the state of a study: by its readers, and by all studies of a server.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex};
 
 use tokio::sync::{Mutex as AsyncMutex, watch};
 
 use super::data::StudyData;
 use chefshat_admission::limits::{FairSemaphore, Permit};
 use chefshat_base::clock::TimeOfDay;
+use chefshat_base::lock::Lock;
 use chefshat_room::ids::GameId;
 
 /// What all studies of a server share.
@@ -29,9 +30,9 @@ pub struct StudyShared {
     /// The memory of its participants and answers.
     pub(super) data: Arc<StudyData>,
     /// Counts the changes of each participant to whom somebody has listened.
-    pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
+    pub(super) views: Lock<BTreeMap<u32, watch::Sender<u64>>>,
     /// Participants whose data are being deleted, and whether the file system has refused it.
-    pub(super) deleting: Mutex<BTreeMap<u32, bool>>,
+    pub(super) deleting: Lock<BTreeMap<u32, bool>>,
     /// Number of interface traces by participant and game, since the server was started. Locked while
     /// traces are added or deleted.
     pub(super) traces: Arc<AsyncMutex<BTreeMap<(u32, GameId), usize>>>,
@@ -43,8 +44,8 @@ impl StudyShared {
         Self {
             _memory: memory,
             data,
-            views: Mutex::default(),
-            deleting: Mutex::default(),
+            views: Lock::default(),
+            deleting: Lock::default(),
             traces: Arc::default(),
             streams: AtomicU64::new(0),
         }

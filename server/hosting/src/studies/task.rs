@@ -16,7 +16,7 @@ use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
-use chefshat_base::clock::{RoomClock, TimeOfDay};
+use chefshat_base::clock::{RoomClock, TimeOfDay, millis};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, GameId, RoomId, SecretHash, StudyId};
 use chefshat_store::StoreError;
@@ -149,7 +149,7 @@ impl Journaled for StudyTask {
         let playing = playing.map(|(number, _)| *number).collect();
         // A server that ended in the middle of a deletion completes it.
         let deleted = participants.iter().filter(|(_, it)| it.data_deleted);
-        *unit.handle.lock_deleting() = deleted.map(|(number, _)| (*number, false)).collect();
+        *unit.handle.shared.deleting.lock() = deleted.map(|(number, _)| (*number, false)).collect();
         Self {
             clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
             unit,
@@ -264,7 +264,7 @@ impl Journaled for StudyTask {
         if is_again {
             self.delete_again = None;
         }
-        let deleting = self.unit.handle.lock_deleting().clone();
+        let deleting = self.unit.handle.shared.deleting.lock().clone();
         // What the file system keeps of one holds up no other.
         let due = (deleting.into_iter())
             .filter(|(_, has_failed)| is_again || !has_failed)
@@ -304,7 +304,7 @@ impl Journaled for StudyTask {
             let mut games = participant.iter().flat_map(|it| &it.games);
             games.any(|game| undeleted.contains_key(&convert::game_of(&game.placed)))
         };
-        handle.lock_deleting().retain(|number, has_failed| {
+        handle.shared.deleting.lock().retain(|number, has_failed| {
             if !due.contains(number) {
                 return true;
             }
@@ -434,7 +434,7 @@ impl StudyTask {
 
     /// Since the task began, by a clock that never jumps.
     fn elapsed_ms(&self) -> u64 {
-        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+        millis(self.clock.now())
     }
 
     fn show_connected(&mut self, number: u32, connected: bool) {
@@ -478,7 +478,12 @@ impl StudyTask {
                 delete_data: true,
                 ..
             } => {
-                self.unit.handle.lock_deleting().insert(*number, false);
+                self.unit
+                    .handle
+                    .shared
+                    .deleting
+                    .lock()
+                    .insert(*number, false);
             }
             _ => {}
         }

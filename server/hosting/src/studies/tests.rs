@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use chefshat_proto::v1::study_stage::Stage;
 use chefshat_study::{Answer, At, ItemAnswer, NewParticipants, ParticipantLink, Refusal, Status};
 use futures::FutureExt as _;
 use tokio::sync::mpsc;
@@ -44,16 +45,18 @@ fn stopped_clock() -> u64 {
     1_000_000 + passed + AHEAD_MS.get()
 }
 
+fn stage(stage: Stage) -> v1::StudyStage {
+    v1::StudyStage {
+        stage: Some(stage),
+        ..v1::StudyStage::default()
+    }
+}
+
 /// A study of two participants who read a text and consent.
 fn settings() -> v1::StudySettings {
-    use v1::study_stage::Stage;
     let seat = v1::SeatConfig {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
         ..v1::SeatConfig::default()
-    };
-    let stage = |stage| v1::StudyStage {
-        stage: Some(stage),
-        ..v1::StudyStage::default()
     };
     v1::StudySettings {
         name: "away".into(),
@@ -103,6 +106,24 @@ struct Lab {
     store: Arc<dyn Store>,
     studies: Arc<Studies>,
     study: Arc<StudyHandle>,
+}
+
+/// Waits until something holds of a study.
+async fn until(study: &StudyHandle, holds: impl Fn(&Study) -> bool) {
+    let mut changes = study.changes();
+    while !study.read(&holds) {
+        changes.changed().await.expect("the study runs");
+    }
+}
+
+/// A data directory, and the settings of a server that has it.
+fn in_a_folder() -> (tempfile::TempDir, ServerConfig) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    (folder, config)
 }
 
 /// The studies of a server with this store.
@@ -172,10 +193,10 @@ impl Lab {
 
     /// Waits until a participant has a status.
     async fn until(&self, number: u32, status: Status) {
-        let mut changes = self.study.changes();
-        while self.status(number) != status {
-            changes.changed().await.expect("the study runs");
-        }
+        until(&self.study, |it| {
+            it.participants()[&number].status == status
+        })
+        .await;
     }
 
     async fn open(&self, number: u32) -> Result<u32, NotDone> {
@@ -184,11 +205,24 @@ impl Lab {
 
     /// The first participant opens the study, stays, and consents.
     async fn begin(&self) -> Presence {
-        assert_eq!(self.open(1).await, Ok(1));
-        let present = self.study.present(1, 1).await;
-        assert_eq!(self.study.consent(at(1, 0)).await, Ok(0));
+        self.begin_as(1).await
+    }
+
+    /// A participant does.
+    async fn begin_as(&self, number: u32) -> Presence {
+        assert_eq!(self.open(number).await, Ok(1));
+        let present = self.study.present(number, 1).await;
+        assert_eq!(self.study.consent(at(number, 0)).await, Ok(0));
         self.settled().await;
         present
+    }
+
+    /// The study on another server, which has resumed it.
+    async fn resumed(&self) -> (Arc<Studies>, Arc<StudyHandle>) {
+        let studies = server(&self.store);
+        studies.restore().await.expect("readable");
+        let study = studies.get(self.study.id()).expect("it is resumed");
+        (studies, study)
     }
 
     /// Lets the study execute what has been sent to it.
@@ -218,10 +252,7 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     assert_eq!(lab.status(1), Status::Active, "it is there");
 
     drop(present);
-    let mut changes = lab.study.changes();
-    while lab.study.read(|study| study.is_connected(1)) {
-        changes.changed().await.expect("the study runs");
-    }
+    until(&lab.study, |study| !study.is_connected(1)).await;
     lab.settled().await;
     advance(LIMIT - Duration::from_millis(1)).await;
     lab.settled().await;
@@ -256,10 +287,7 @@ async fn a_pause_of_the_process_drops_nobody_out() {
     let watching = tokio::spawn(clock.watch());
     assert_eq!(lab.open(1).await, Ok(1));
     drop(lab.study.present(1, 1).await);
-    let mut changes = lab.study.changes();
-    while lab.study.read(|study| study.is_connected(1)) {
-        changes.changed().await.expect("the study runs");
-    }
+    until(&lab.study, |study| !study.is_connected(1)).await;
     lab.settled().await;
     advance(LIMIT * 5).await;
     lab.settled().await;
@@ -293,10 +321,7 @@ async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
     let lab = Lab::new().await;
     assert_eq!(lab.open(1).await, Ok(1));
     drop(lab.study.present(1, 1).await);
-    let mut changes = lab.study.changes();
-    while lab.study.read(|study| study.is_connected(1)) {
-        changes.changed().await.expect("the study runs");
-    }
+    until(&lab.study, |study| !study.is_connected(1)).await;
     lab.studies.stop();
     lab.settled().await;
     let before = polls()[&LongTask::Study];
@@ -351,20 +376,13 @@ async fn a_game_that_cannot_be_read_back_ends_no_study() {
     lab.study.stopped().await;
 
     failing.games_unreadable.store(true, Ordering::Relaxed);
-    let studies = server(&lab.store);
-    assert_eq!(studies.restore().await, Ok(1));
-    let study = studies.get(lab.study.id()).expect("it is resumed");
-    let outcome = || {
-        study.read(|it| {
-            let game = it.participants()[&1].games.last().cloned();
-            game.and_then(|game| game.ended).map(|(outcome, _)| outcome)
-        })
+    let (_studies, study) = lab.resumed().await;
+    let outcome = |it: &Study| {
+        let game = it.participants()[&1].games.last()?;
+        game.ended.map(|(outcome, _)| outcome)
     };
-    let mut changes = study.changes();
-    while outcome().is_none() {
-        changes.changed().await.expect("it runs");
-    }
-    assert_eq!(outcome(), Some(chefshat_study::Outcome::Aborted));
+    until(&study, |it| outcome(it).is_some()).await;
+    assert_eq!(study.read(outcome), Some(chefshat_study::Outcome::Aborted));
 }
 
 #[tokio::test(start_paused = true)]
@@ -419,11 +437,7 @@ async fn a_study_that_runs_is_not_resumed_beside_itself() {
 
 #[tokio::test(start_paused = true)]
 async fn samples_that_cannot_be_deleted_stop_no_study_and_are_tried_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let config = ServerConfig {
-        data_dir: Some(folder.path().to_path_buf()),
-        ..ServerConfig::default()
-    };
+    let (folder, config) = in_a_folder();
     let lab = Lab::of(&config).await;
     let _present = lab.begin().await;
     let game = (lab.study).read(|study| study.participants()[&1].games[0].placed.clone());
@@ -461,10 +475,7 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     assert_eq!(consented, Ok(0), "it continues");
     // Its game begins when it is there.
     let _present = study.present(1, 1).await;
-    let mut changes = study.changes();
-    while study.read(|study| study.participants()[&1].games.is_empty()) {
-        changes.changed().await.expect("the study runs");
-    }
+    until(study, |study| !study.participants()[&1].games.is_empty()).await;
     let link = study.link(1).link;
     let link = ParticipantLink::parse(&link).expect("a link");
     assert!(studies.get(Studies::full_id(link.study())).is_some());
@@ -540,11 +551,7 @@ async fn a_study_is_deleted_at_its_date_and_not_when_the_clock_jumps() {
 #[tokio::test(start_paused = true)]
 async fn a_study_that_could_not_be_deleted_at_its_date_is_tried_again_however_late_that_is() {
     const HOUR: Duration = Duration::from_secs(3_600);
-    let folder = tempfile::tempdir().expect("a folder");
-    let config = ServerConfig {
-        data_dir: Some(folder.path().to_path_buf()),
-        ..ServerConfig::default()
-    };
+    let (folder, config) = in_a_folder();
     let dated = v1::StudySettings {
         deletes_at_ms: stopped_clock() + 1_000,
         ..settings()
@@ -610,7 +617,7 @@ async fn studies_count_after_a_restart_too() {
     assert_eq!(deleted, Ok((2, 0)));
     let refused = studies.create(settings(), None, Key::Local).await;
     assert!(
-        matches!(refused, Err(CreateProblem::Refused(_))),
+        matches!(refused, Err(CreateError::Refused(_))),
         "still full"
     );
 }
@@ -631,11 +638,8 @@ async fn all_who_wait_for_rooms_get_them_after_a_restart_and_a_taken_id_ends_one
     let lab = Lab::with(&config, settings, WAITING as usize).await;
     let mut present = Vec::new();
     for number in 1..=WAITING {
-        assert_eq!(lab.open(number).await, Ok(1));
-        present.push(lab.study.present(number, 1).await);
-        assert_eq!(lab.study.consent(at(number, 0)).await, Ok(0));
+        present.push(lab.begin_as(number).await);
     }
-    lab.settled().await;
     let placed = |study: &StudyHandle, number| {
         study.read(|study| study.participants()[&number].games[0].placed.clone())
     };
@@ -647,20 +651,15 @@ async fn all_who_wait_for_rooms_get_them_after_a_restart_and_a_taken_id_ends_one
     let _held = created.expect("its id is free");
     lab.studies.end();
 
-    let studies = server(&lab.store);
-    studies.restore().await.expect("readable");
-    let study = studies.get(lab.study.id()).expect("it is resumed");
+    let (studies, study) = lab.resumed().await;
     let rooms = &studies.rooms;
     let has_room = |number| {
         rooms
             .get(convert::room_of(&placed(&study, number)))
             .is_some()
     };
-    let mut changes = study.changes();
-    let has_ended = || study.read(|study| study.participants()[&TAKEN].games[0].ended.is_some());
-    while !has_ended() {
-        changes.changed().await.expect("the study runs");
-    }
+    let has_ended = |study: &Study| study.participants()[&TAKEN].games[0].ended.is_some();
+    until(&study, has_ended).await;
     for number in 1..=WAITING {
         assert_eq!(has_room(number), number != TAKEN, "{number}");
     }
@@ -684,9 +683,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     assert_eq!(rows().await, 2);
     lab.studies.end();
 
-    let studies = server(&lab.store);
-    studies.restore().await.expect("readable");
-    let study = studies.get(id).expect("it is resumed");
+    let (studies, study) = lab.resumed().await;
     let unknown = study.open(Key::Local, 99, None).await;
     assert_eq!(unknown, Err(Refusal::Unknown.into()));
     assert_eq!(rows().await, 2, "nothing is left to delete");
@@ -704,9 +701,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
         .store
         .append_study(id, 3, vec![withdrew(3), withdrew(4)]);
     appended.await.expect("committed");
-    let studies = server(&lab.store);
-    studies.restore().await.expect("readable");
-    let study = studies.get(id).expect("it is resumed");
+    let (_studies, study) = lab.resumed().await;
     let unknown = study.open(Key::Local, 99, None).await;
     assert_eq!(unknown, Err(Refusal::Unknown.into()));
     assert_eq!(rows().await, 1, "rewritten");
@@ -809,11 +804,7 @@ async fn a_test_participant_ends_its_game_and_goes_on_and_nobody_waits_for_it() 
     let number = added.expect("there is space");
     // Another one is in the middle of the study to its end.
     assert_eq!(lab.open(number + 1).await, Ok(1));
-    assert_eq!(lab.open(number).await, Ok(1));
-    let _present = study.present(number, 1).await;
-    let consented = study.consent(at(number, 0)).await;
-    assert_eq!(consented, Ok(0));
-    lab.settled().await;
+    let _present = lab.begin_as(number).await;
     let game = |number| study.read(|it| it.participants()[&number].games.last().cloned());
     let ended = |number| game(number).and_then(|game| game.ended);
     assert!(game(number).is_some() && ended(number).is_none());
@@ -849,7 +840,6 @@ async fn a_test_participant_ends_its_game_and_goes_on_and_nobody_waits_for_it() 
 #[tokio::test]
 async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     use v1::study_item::Kind;
-    use v1::study_stage::Stage;
     let item = |id: &str, optional, kind| v1::StudyItem {
         id: id.into(),
         text: format!("About {id}, \"as it was\""),
@@ -915,13 +905,8 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         levels: vec!["-low".into(), "high".into()],
     }];
     settings.conditions[0].levels = [("mood".to_owned(), "-low".to_owned())].into();
-    settings.stages.insert(
-        1,
-        v1::StudyStage {
-            stage: Some(Stage::Questionnaire(questionnaire)),
-            ..v1::StudyStage::default()
-        },
-    );
+    let questionnaire = stage(Stage::Questionnaire(questionnaire));
+    settings.stages.insert(1, questionnaire);
     let lab = Lab::with(&ServerConfig::default(), settings, 4).await;
     for number in 1..=3 {
         assert_eq!(lab.study.open(Key::Local, number, None).await, Ok(1));
@@ -950,9 +935,12 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     assert_eq!(tested, Ok(5));
     let files = exported(&lab, false).await;
     let tables = tables(&files);
-    let cells = |row: &BTreeMap<String, String>, columns: &[&str]| {
-        let cells = columns.iter().map(|column| row[*column].clone());
-        cells.collect::<Vec<_>>().join("|")
+    let cells = |tables: &Tables, table: &str, columns: &[&str]| -> Vec<String> {
+        let cells = |row: &BTreeMap<String, String>| {
+            let cells = columns.iter().map(|column| row[*column].clone());
+            cells.collect::<Vec<_>>().join("|")
+        };
+        tables[table].iter().map(cells).collect()
     };
     let columns = [
         "number",
@@ -964,10 +952,8 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         "label",
         "passed",
     ];
-    let answers = tables["answers.csv"].iter();
-    let answers: Vec<String> = answers.map(|row| cells(row, &columns)).collect();
     assert_eq!(
-        answers,
+        cells(&tables, "answers.csv", &columns),
         [
             "1|'-low|liked|1|answered|5|very|",
             "1|'-low|seen|2|answered|0 2|'=cards; nothing|",
@@ -987,7 +973,6 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
             "3|'-low|check|4|not_sent|||",
         ]
     );
-    let items = tables["items.csv"].iter();
     let columns = [
         "item",
         "kind",
@@ -999,9 +984,8 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         "shown_if",
         "attention_check",
     ];
-    let items: Vec<String> = items.map(|row| cells(row, &columns)).collect();
     assert_eq!(
-        items,
+        cells(&tables, "items.csv", &columns),
         [
             "liked|likert|true|1|5|1 = not at all; 5 = very|||",
             "seen|choices|false|0|2|0 = =cards; 1 = faces; 2 = nothing|||",
@@ -1010,7 +994,6 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
             "check|likert|true|1|5|1 = not at all; 5 = very|||3..",
         ]
     );
-    let people = tables["participants.csv"].iter();
     let columns = [
         "number",
         "state",
@@ -1019,9 +1002,8 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         "attention_checks",
         "attention_checks_passed",
     ];
-    let people: Vec<String> = people.map(|row| cells(row, &columns)).collect();
     assert_eq!(
-        people,
+        cells(&tables, "participants.csv", &columns),
         [
             "1|active|only|'-low|1|1",
             "2|active|only|'-low|1|0",
@@ -1066,20 +1048,13 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         .find(|row| row["column"] == "factor_mood");
     assert_eq!(mood.expect("a row")["codes"], "'-low; high");
     let tests = self::tables(&exported(&lab, true).await);
-    let tests = tests["participants.csv"].iter();
-    let tests: Vec<String> = tests
-        .map(|row| cells(row, &["participant", "test"]))
-        .collect();
+    let tests = cells(&tests, "participants.csv", &["participant", "test"]);
     assert_eq!(tests, ["T05|true"]);
 }
 
 #[tokio::test]
 async fn samples_that_cannot_be_read_end_no_export() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let config = ServerConfig {
-        data_dir: Some(folder.path().to_path_buf()),
-        ..ServerConfig::default()
-    };
+    let (folder, config) = in_a_folder();
     let lab = Lab::of(&config).await;
     let game = GameId::from_bytes([9; 16]);
     let [stuck, other] =
@@ -1139,7 +1114,6 @@ async fn traces_that_were_sent_again_are_exported_once() {
 
 #[tokio::test(start_paused = true)]
 async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
-    use v1::study_stage::Stage;
     let studies = server(&(Arc::new(MemoryStore::default()) as Arc<dyn Store>));
     let remote = Key::Address([192, 0, 2, 1].into());
     let mut long = settings();
@@ -1147,11 +1121,7 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
         text: "x".repeat(20_000),
         ..v1::StudyText::default()
     };
-    let text = v1::StudyStage {
-        stage: Some(Stage::Text(text)),
-        ..v1::StudyStage::default()
-    };
-    long.stages.splice(1..1, vec![text; 45]);
+    long.stages.splice(1..1, vec![stage(Stage::Text(text)); 45]);
     let create = async || studies.create(long.clone(), None, remote).await;
     let mut created = Vec::new();
     let refused = loop {
@@ -1163,7 +1133,7 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     };
     // A tenth of 48 MiB.
     assert_eq!(created.len(), 5);
-    let CreateProblem::Refused(refused) = refused else {
+    let CreateError::Refused(refused) = refused else {
         panic!("{refused}");
     };
     assert_eq!(refused.reason, "TOO_MANY_STUDIES");
@@ -1178,13 +1148,12 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     deleting.expect("nobody is in it");
     tokio::task::yield_now().await;
     create().await.expect("its memory is free again");
-    assert!(matches!(create().await, Err(CreateProblem::Refused(_))));
+    assert!(matches!(create().await, Err(CreateError::Refused(_))));
 }
 
 /// One participant, who answers questionnaires with long texts and nothing else.
 fn long_answers(questionnaires: usize) -> v1::StudySettings {
     use v1::study_item::Kind;
-    use v1::study_stage::Stage;
     let item = |number| v1::StudyItem {
         id: format!("q{number}"),
         text: "Why?".into(),
@@ -1193,13 +1162,12 @@ fn long_answers(questionnaires: usize) -> v1::StudySettings {
         })),
         ..v1::StudyItem::default()
     };
-    let questionnaire = |number| v1::StudyStage {
-        stage: Some(Stage::Questionnaire(v1::StudyQuestionnaire {
+    let questionnaire = |number| {
+        stage(Stage::Questionnaire(v1::StudyQuestionnaire {
             id: format!("s{number}"),
             items: (0..100).map(item).collect(),
             ..v1::StudyQuestionnaire::default()
-        })),
-        ..v1::StudyStage::default()
+        }))
     };
     let mut settings = settings();
     settings
@@ -1309,7 +1277,6 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
 
 /// The settings of a study with pairs.
 fn in_pairs() -> v1::StudySettings {
-    use v1::study_stage::Stage;
     let mut settings = settings();
     settings.participants = 4;
     settings.conditions[0].seats.truncate(2);
@@ -1318,10 +1285,7 @@ fn in_pairs() -> v1::StudySettings {
         wait_ms: 30_000,
         left_over: v1::StudyLeftOver::Dismiss.into(),
     });
-    let arrival = v1::StudyStage {
-        stage: Some(Stage::Arrival(v1::StudyArrival::default())),
-        ..v1::StudyStage::default()
-    };
+    let arrival = stage(Stage::Arrival(v1::StudyArrival::default()));
     settings.stages.insert(1, arrival);
     settings
 }
@@ -1331,11 +1295,7 @@ async fn pairs_are_formed_and_who_waits_too_long_is_left_over() {
     let lab = Lab::with(&ServerConfig::default(), in_pairs(), 3).await;
     let mut present = Vec::new();
     for number in [3, 1, 2] {
-        assert_eq!(lab.open(number).await, Ok(1));
-        present.push(lab.study.present(number, 1).await);
-        let consented = lab.study.consent(at(number, 0)).await;
-        assert_eq!(consented, Ok(0));
-        lab.settled().await;
+        present.push(lab.begin_as(number).await);
     }
     let groups = |study: &Study| [1, 2, 3].map(|number| study.participants()[&number].group);
     assert_eq!(lab.study.read(groups), [Some(1), None, Some(1)]);
@@ -1364,14 +1324,7 @@ async fn pairs_are_formed_and_who_waits_too_long_is_left_over() {
 #[tokio::test(start_paused = true)]
 async fn a_game_waits_for_a_partner_who_does_not_come_no_longer_than_for_one_who_is_late() {
     let lab = Lab::with(&ServerConfig::default(), in_pairs(), 2).await;
-    let mut present = Vec::new();
-    for number in [1, 2] {
-        assert_eq!(lab.open(number).await, Ok(1));
-        present.push(lab.study.present(number, 1).await);
-        let consented = lab.study.consent(at(number, 0)).await;
-        assert_eq!(consented, Ok(0));
-        lab.settled().await;
-    }
+    let _present = [lab.begin_as(1).await, lab.begin_as(2).await];
     let room = |study: &Study| RoomId::from_bytes(study.participants()[&1].games[0].placed.room);
     let room = lab.study.read(room);
     let header = lab.studies.rooms().header(room).expect("it has a room");
@@ -1379,5 +1332,4 @@ async fn a_game_waits_for_a_partner_who_does_not_come_no_longer_than_for_one_who
     let study = header.study.as_ref().expect("it is of a study");
     let seats: Vec<usize> = study.members.iter().map(|it| it.seat.index()).collect();
     assert_eq!((study.group, seats), (Some(1), vec![0, 2]));
-    drop(present);
 }

@@ -17,7 +17,7 @@ use chefshat_admission::access::{Relation, Secrets};
 use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 use chefshat_wire::outbox::StreamEnd;
 
 /// Why a game has no physical table now.
@@ -209,7 +209,7 @@ impl TournamentHandle {
         v1::Tournament {
             tournament_id: self.header.id.to_string(),
             settings: Some(settings),
-            state: convert::tournament_state(state).into(),
+            state: state.to_proto().into(),
             participants: Vec::new(),
             round: core.round(),
             rounds: core.rounds(),

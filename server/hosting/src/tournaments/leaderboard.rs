@@ -216,6 +216,7 @@ mod tests {
 
     use chefshat_room::ids::Id;
     use chefshat_room::journal::GameHeader;
+    use chefshat_room::testing::Chance;
 
     use crate::rooms::NewRoom;
     use crate::tournaments::leaderboard::*;
@@ -288,27 +289,20 @@ mod tests {
 
     /// The ratings after the same games, with or without a trick.
     fn rated_with(trick: Trick) -> Ratings<Identity> {
-        // SplitMix64.
-        let mut state = 1_u64;
-        let mut below = |bound: usize| {
-            state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let mixed = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            usize::try_from((mixed ^ (mixed >> 31)) % bound as u64).expect("below the bound")
-        };
+        let mut chance = Chance(1);
         let mut games = Vec::new();
         for number in 0..372 {
             // Of the games 72 are the farmer's.
             let is_own = number % 31 < 6;
             let mut order = if is_own { vec![FARMER] } else { Vec::new() };
             while order.len() < 4 {
-                let who = 1 + below(PLAYERS - 1);
+                let who = 1 + chance.index(PLAYERS - 1);
                 if !order.contains(&who) {
                     order.push(who);
                 }
             }
             for index in (1..4).rev() {
-                order.swap(index, below(index + 1));
+                order.swap(index, chance.index(index + 1));
             }
             if let Some(results) = results(&game(&order, trick)) {
                 games.push((number, String::new(), results));

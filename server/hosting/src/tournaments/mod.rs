@@ -32,19 +32,19 @@ pub use shared::ComputeError;
 pub use crate::journaled::Stopped;
 
 use crate::config::MAX_START_AHEAD;
-use crate::journaled::{self, Folded, New, Registry, owner_of};
-use crate::rooms::{CODES_TRIED, Rooms};
+use crate::journaled::{Folded, New, Registry, owner_of};
+use crate::rooms::{self, CODES_TRIED, Rooms};
 use chefshat_admission::limits::Key;
-use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
+use chefshat_base::clock::{TimeOfDay, millis, since_epoch_ms};
 use chefshat_room::ids::{GameId, RequestKey, TournamentToken, join_code, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
-use state::{Common, TournamentShared, TournamentState, millis};
+use state::{Common, TournamentShared, TournamentState};
 use task::TournamentTask;
 
 /// Why a tournament was not created.
-pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;
+pub type CreateError = rooms::CreateError<SettingsProblem>;
 
 /// The tournaments of a server.
 pub type Tournaments = Registry<TournamentTask>;
@@ -64,15 +64,15 @@ impl Tournaments {
     /// Creates a tournament. Returns it with its owner token.
     ///
     /// # Errors
-    /// See [`CreateProblem`].
+    /// See [`CreateError`].
     pub async fn create(
         self: &Arc<Self>,
         name: &str,
         plan: TournamentPlan,
         request: Option<RequestKey>,
         charged: Key,
-    ) -> Result<(Arc<TournamentHandle>, TournamentToken), CreateProblem> {
-        let core = Tournament::new(plan.core.clone()).map_err(CreateProblem::Settings)?;
+    ) -> Result<(Arc<TournamentHandle>, TournamentToken), CreateError> {
+        let core = Tournament::new(plan.core.clone()).map_err(CreateError::Settings)?;
         let owner = owner_of(request);
         let (tournaments, name) = (Arc::clone(self), name.to_owned());
         let making = async move { tournaments.make(&name, plan, core, owner).await };
@@ -85,9 +85,9 @@ impl Tournaments {
         plan: TournamentPlan,
         core: Tournament,
         owner: TournamentToken,
-    ) -> Result<New<TournamentTask>, CreateProblem> {
+    ) -> Result<New<TournamentTask>, CreateError> {
         let now_ms = (self.common.now)();
-        check_start(plan.start_at_ms, now_ms).map_err(CreateProblem::Settings)?;
+        check_start(plan.start_at_ms, now_ms).map_err(CreateError::Settings)?;
         let mut header = TournamentHeader {
             id: owner.subject,
             settings: convert::settings_to_proto(name, &plan),

@@ -1,7 +1,6 @@
 //! The state of a tournament, and what is shared besides it.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_tournament::{Change, State, Tournament};
@@ -128,9 +127,4 @@ impl TournamentState {
 pub struct TournamentShared {
     pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
     pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
-}
-
-/// Whole milliseconds.
-pub(super) fn millis(duration: Duration) -> u64 {
-    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
 }

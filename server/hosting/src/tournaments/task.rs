@@ -10,12 +10,12 @@ use tokio::time::Instant;
 use tracing::info;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use super::state::{Common, TournamentShared, TournamentState, millis};
+use super::state::{Common, TournamentShared, TournamentState};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::limits::{Key, Refused};
-use chefshat_base::clock::{RoomClock, TimeOfDay};
+use chefshat_base::clock::{RoomClock, TimeOfDay, millis};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{self, RoomId, SecretHash, TournamentId, TournamentToken};
 use chefshat_store::StoreError;

@@ -4,7 +4,9 @@ use std::cell::Cell;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use chefshat_proto::v1;
 use futures::FutureExt as _;
+use tokio::time::Instant;
 
 use super::*;
 use crate::config::{MAX_TOURNAMENTS, ServerConfig};
@@ -26,14 +28,22 @@ fn server(store: Arc<dyn Store>) -> Arc<Tournaments> {
     Tournaments::new(Rooms::for_tests(store), TaskTracker::new())
 }
 
+fn plan(settings: &v1::TournamentSettings) -> TournamentPlan {
+    convert::tournament_plan(settings, [7; 32]).expect("valid settings")
+}
+
 /// A new tournament with these settings.
 async fn created(
     tournaments: &Arc<Tournaments>,
-    settings: &chefshat_proto::v1::TournamentSettings,
+    settings: &v1::TournamentSettings,
 ) -> Arc<TournamentHandle> {
-    let plan = convert::tournament_plan(settings, [7; 32]).expect("valid settings");
-    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
-    created.expect("made").0
+    let created = tournaments.create("Coppa", plan(settings), None, Key::Local);
+    created.await.expect("made").0
+}
+
+/// A participant of this name.
+async fn joined(handle: &TournamentHandle, name: &str) -> (usize, TournamentToken) {
+    handle.join(entrant(name)).await.expect("joined")
 }
 
 #[tokio::test]
@@ -42,15 +52,8 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
     let tracker = TaskTracker::new();
     let rooms = Rooms::for_tests(Arc::clone(&store));
     let tournaments = Tournaments::new(rooms, tracker.clone());
-    let settings = chefshat_proto::v1::TournamentSettings {
-        format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
-        ..Default::default()
-    };
-    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
     // The caller is cancelled during the commit.
-    let asked = tournaments
-        .create("Coppa", plan, None, Key::Local)
-        .now_or_never();
+    let asked = created(&tournaments, &coppa()).now_or_never();
     assert!(asked.is_none(), "the commit takes a while");
     tournaments.end();
     tracker.close();
@@ -72,10 +75,9 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
 }
 
 /// Settings of a tournament of built-in agents in games of one Shift.
-fn built_in(name: &str) -> chefshat_proto::v1::TournamentSettings {
-    use chefshat_proto::v1;
+fn coppa() -> v1::TournamentSettings {
     v1::TournamentSettings {
-        name: name.into(),
+        name: "Coppa".into(),
         format: v1::TournamentFormat::Swiss.into(),
         built_in_agents: vec!["random".into(); 4],
         rounds: 1,
@@ -104,7 +106,7 @@ async fn readers_see_only_committed_changes() {
     let store = Arc::new(chefshat_store::testing::FailingStore::after(u64::MAX));
     let commits = Arc::clone(&store.tournament_commits);
     let tournaments = server(store);
-    let handle = created(&tournaments, &built_in("Coppa")).await;
+    let handle = created(&tournaments, &coppa()).await;
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
 
@@ -126,7 +128,6 @@ async fn readers_see_only_committed_changes() {
 
 #[tokio::test]
 async fn a_forged_record_of_a_coming_game_is_not_counted() {
-    use chefshat_proto::v1;
     let (_folder, store) = database().await;
     let start = |max_rooms| {
         let config = ServerConfig {
@@ -138,7 +139,7 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     };
     // No room can be created: the game has its id, and waits.
     let tournaments = start(0);
-    let handle = created(&tournaments, &built_in("Coppa")).await;
+    let handle = created(&tournaments, &coppa()).await;
     let mut changes = handle.changes();
     handle.begin().await.expect("it can start");
     let forged = loop {
@@ -187,7 +188,7 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
 async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let (_folder, store) = database().await;
     let start = || server(Arc::clone(&store));
-    let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let plan = || plan(&coppa());
     let request = RequestKey::new([1; 32], b"content");
     let ada = || Entry {
         request_id: Some([2; 32]),
@@ -202,7 +203,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let refused = tournaments
         .create("Coppa", plan(), Some(other), Key::Local)
         .await;
-    assert!(matches!(refused, Err(CreateProblem::RequestIdUsed(_))));
+    assert!(matches!(refused, Err(CreateError::RequestIdUsed)));
 
     let (first, second) = tokio::join!(handle.join(ada()), handle.join(ada()));
     let joined = first.expect("joined");
@@ -214,7 +215,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let (other, again) = create().await.expect("there");
     assert!(Arc::ptr_eq(&handle, &other) && owner == again);
     let refused = tournaments.create("Coppa", plan(), None, Key::Local).await;
-    assert!(matches!(refused, Err(CreateProblem::ShuttingDown(_))));
+    assert!(matches!(refused, Err(CreateError::ShuttingDown)));
     tournaments.end();
 
     let tournaments = start();
@@ -244,14 +245,14 @@ fn in_memory() -> Arc<Tournaments> {
 
 std::thread_local! {
     /// When the test of this thread began, on its stopped clock.
-    static BEGAN: tokio::time::Instant = tokio::time::Instant::now();
+    static BEGAN: Instant = Instant::now();
     /// How much the time of day of this thread is ahead, milliseconds.
     static AHEAD_MS: Cell<u64> = const { Cell::new(0) };
 }
 
 /// A time of day that advances with the clock of the test.
 fn stopped_clock() -> u64 {
-    1_000_000 + millis(BEGAN.with(tokio::time::Instant::elapsed)) + AHEAD_MS.get()
+    1_000_000 + millis(BEGAN.with(Instant::elapsed)) + AHEAD_MS.get()
 }
 
 /// Waits until a tournament is in this state, however long that takes on the paused clock.
@@ -266,18 +267,17 @@ async fn until(handle: &TournamentHandle, wanted: impl Fn(&Tournament) -> bool) 
 async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
     let tournaments = in_memory();
     let hour_ms = 3_600_000;
-    let settings = |agents, start_at_ms| chefshat_proto::v1::TournamentSettings {
+    let settings = |agents, start_at_ms| v1::TournamentSettings {
         start_at_ms,
         built_in_agents: vec!["random".into(); agents],
-        ..built_in("Coppa")
+        ..coppa()
     };
     let create = async |agents, start_at_ms| {
-        let plan = convert::tournament_plan(&settings(agents, start_at_ms), [7; 32]);
-        let plan = plan.expect("valid settings");
+        let plan = plan(&settings(agents, start_at_ms));
         tournaments.create("Coppa", plan, None, Key::Local).await
     };
     let now_ms = stopped_clock();
-    let before = tokio::time::Instant::now();
+    let before = Instant::now();
     let (handle, _) = create(4, now_ms + hour_ms).await.expect("made");
     assert_eq!(handle.read(Tournament::state), State::Open);
     until(&handle, |core| core.state() != State::Open).await;
@@ -287,8 +287,7 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
     let (handle, _) = create(1, stopped_clock() + 1_000).await.expect("made");
     tokio::time::sleep(Duration::from_secs(60)).await;
     assert_eq!(handle.read(Tournament::state), State::Open);
-    let joined = handle.join(entrant("Ada")).await;
-    joined.expect("joined");
+    joined(&handle, "Ada").await;
     until(&handle, |core| core.state() != State::Open).await;
 
     for refused in [now_ms - 1, stopped_clock() + 367 * 24 * hour_ms] {
@@ -304,9 +303,9 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
 async fn it_starts_at_its_time_although_the_clock_was_set_meanwhile() {
     let tournaments = in_memory();
     let days_ms = 300 * 24 * 3_600_000;
-    let settings = chefshat_proto::v1::TournamentSettings {
+    let settings = v1::TournamentSettings {
         start_at_ms: stopped_clock() + days_ms,
-        ..built_in("Coppa")
+        ..coppa()
     };
     let handle = created(&tournaments, &settings).await;
     let a_while = Duration::from_secs(120);
@@ -331,7 +330,7 @@ async fn games_whose_rooms_fail_are_voided() {
 async fn rooms_that_no_running_game_has_are_closed() {
     use crate::rooms::{NewRoom, PartOf, Seating};
     let tournaments = in_memory();
-    let handle = created(&tournaments, &built_in("Coppa")).await;
+    let handle = created(&tournaments, &coppa()).await;
     let game = chefshat_room::journal::TournamentGame {
         tournament: handle.id(),
         series: None,
@@ -359,7 +358,7 @@ async fn rooms_that_no_running_game_has_are_closed() {
 async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
     let (_folder, store) = database().await;
     let tournaments = server(Arc::clone(&store));
-    let open = created(&tournaments, &built_in("Coppa")).await;
+    let open = created(&tournaments, &coppa()).await;
     // Its code was that of a tournament that another node had.
     let former = TournamentHeader {
         id: TournamentId::random(),
@@ -382,10 +381,10 @@ async fn a_tournament_that_is_over_takes_no_join_code_from_an_open_one() {
 /// The games of a tournament that was played to its end on this store.
 async fn played(store: &Arc<FailingStore>) -> (Arc<TournamentHandle>, Vec<GameState>) {
     let tournaments = server(Arc::clone(store) as _);
-    let settings = chefshat_proto::v1::TournamentSettings {
+    let settings = v1::TournamentSettings {
         built_in_agents: vec!["random".into(); 4],
         start_when_joined: 4,
-        ..built_in("Coppa")
+        ..coppa()
     };
     let handle = created(&tournaments, &settings).await;
     until(&handle, |core| core.state() == State::Finished).await;
@@ -433,20 +432,19 @@ async fn a_game_that_cannot_be_read_back_ends_no_tournament() {
 #[tokio::test(start_paused = true)]
 async fn a_pause_ends_by_itself() {
     let tournaments = in_memory();
-    let settings = chefshat_proto::v1::TournamentSettings {
+    let settings = v1::TournamentSettings {
         built_in_agents: Vec::new(),
         no_show_time_ms: 86_400_000,
-        ..built_in("Coppa")
+        ..coppa()
     };
     let handle = created(&tournaments, &settings).await;
     for name in ["Ada", "Bo", "Cem", "Dia"] {
-        let joined = handle.join(entrant(name)).await;
-        joined.expect("joined");
+        joined(&handle, name).await;
     }
     handle.begin().await.expect("begun");
     let paused = handle.change_by_hand(ByHand::SetPaused(true)).await;
     assert_eq!(paused, Ok(None));
-    let before = tokio::time::Instant::now();
+    let before = Instant::now();
     until(&handle, |core| !core.is_paused()).await;
     assert!(before.elapsed() >= crate::config::TOURNAMENT_PAUSE);
     // Nobody comes, so it ends without results.
@@ -475,18 +473,14 @@ fn cem(request_id: u8) -> Newcomer {
 #[tokio::test]
 async fn the_ticket_of_a_participant_ends_with_its_place() {
     let tournaments = in_memory();
-    let handle = created(&tournaments, &built_in("Coppa")).await;
-    let join = async |name| {
-        let joined = handle.join(entrant(name)).await;
-        joined.expect("joined")
-    };
+    let handle = created(&tournaments, &coppa()).await;
     let change = async |what| handle.change_by_hand(what).await;
     let known = |ticket: &TournamentToken| handle.participant_of(&ticket.secret);
-    let (ada, adas) = join("Ada").await;
+    let (ada, adas) = joined(&handle, "Ada").await;
     assert_eq!(known(&adas), Some(ada));
     assert_eq!(change(withdrawal(&adas)).await, Ok(None));
     assert_eq!(known(&adas), None, "the place is free");
-    let (bo, bos) = join("Bo").await;
+    let (bo, bos) = joined(&handle, "Bo").await;
     assert_ne!(bo, ada, "no number is used again");
     // Decided when it is made: the ticket has no place any more.
     let again = change(withdrawal(&adas)).await;
@@ -525,9 +519,9 @@ async fn the_ticket_of_a_participant_ends_with_its_place() {
 #[tokio::test]
 async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
     let tournaments = in_memory();
-    let settings = chefshat_proto::v1::TournamentSettings {
+    let settings = v1::TournamentSettings {
         physical_tables: 1,
-        ..built_in("Coppa")
+        ..coppa()
     };
     let handle = created(&tournaments, &settings).await;
     let table = Entry {
@@ -578,11 +572,8 @@ async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
 async fn one_caller_cannot_join_and_withdraw_for_ever() {
     use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
     let tournaments = in_memory();
-    let handle = created(&tournaments, &built_in("Coppa")).await;
-    let come = async || {
-        let joined = handle.join(entrant("fickle")).await;
-        joined.expect("joined").1
-    };
+    let handle = created(&tournaments, &coppa()).await;
+    let come = async || joined(&handle, "fickle").await.1;
     let go = async |ticket: &TournamentToken, address: [u8; 4]| {
         let what = ByHand::Withdraw {
             who: Who::Ticket(ticket.hash()),
@@ -612,12 +603,8 @@ async fn one_caller_cannot_join_and_withdraw_for_ever() {
 async fn tournaments_count_after_a_restart_too() {
     let (_folder, store) = database().await;
     let start = || server(Arc::clone(&store));
-    let settings = chefshat_proto::v1::TournamentSettings {
-        format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
-        ..Default::default()
-    };
     let create = async |tournaments: &Arc<Tournaments>, caller| {
-        let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+        let plan = plan(&coppa());
         tournaments.create("Coppa", plan, None, caller).await
     };
     let first = start();

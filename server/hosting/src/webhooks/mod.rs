@@ -8,7 +8,7 @@ mod event;
 mod settings;
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_room::ids::{TournamentId, UnitId};
@@ -24,7 +24,8 @@ use event::{Event, Outcomes};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
 use chefshat_base::SERVER_VERSION;
-use chefshat_base::clock::since_epoch;
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::lock::Lock;
 use chefshat_base::metrics::{Metrics, WebhookOutcome};
 
 /// Most events that wait for delivery, between attempts too. Further ones are dropped and counted.
@@ -40,7 +41,7 @@ struct Queue {
     /// A permit for each event that is not settled.
     places: Arc<Semaphore>,
     /// Taken by the task that delivers.
-    delivery: Mutex<Option<Delivery>>,
+    delivery: Lock<Option<Delivery>>,
     outcomes: Outcomes,
 }
 
@@ -53,7 +54,7 @@ impl Webhooks {
         Self(Some(Arc::new(Queue {
             events,
             places: Arc::new(Semaphore::new(MAX_WAITING)),
-            delivery: Mutex::new(Some(delivery)),
+            delivery: Lock::new(Some(delivery)),
             outcomes: Outcomes::new(metrics),
         })))
     }
@@ -127,7 +128,7 @@ impl Webhooks {
         let body = json!({
             "id": id,
             "type": kind,
-            "at_ms": u64::try_from(since_epoch().as_millis()).unwrap_or(u64::MAX),
+            "at_ms": since_epoch_ms(),
             "server_version": SERVER_VERSION,
             "data": data(),
         });
@@ -145,9 +146,7 @@ impl Webhooks {
         let Some(queue) = self.0 else {
             return;
         };
-        let delivery = (queue.delivery.lock())
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let delivery = queue.delivery.lock().take();
         if let Some(delivery) = delivery {
             delivery.run(&queue.outcomes, closing).await;
         }

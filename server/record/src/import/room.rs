@@ -23,7 +23,7 @@ pub struct PhysicalRoom {
 }
 
 /// An entry of the record of a physical room.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub enum RoomEntry {
     /// A decision. `record`: what does not follow from the game: source, time, bank, attempts,
     /// annotations.

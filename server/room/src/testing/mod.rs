@@ -1,6 +1,7 @@
 //! A room under a simulated clock, for tests of the core and of the server.
 #![allow(missing_docs, reason = "test support")]
 
+mod chance;
 pub mod real_table;
 
 use std::collections::BTreeMap;
@@ -21,6 +22,7 @@ use crate::log::RoomEvent;
 use crate::policy::Policy;
 use crate::table::RoomGame;
 use crate::{Answer, Answered, ConnectionId, Core, JoinError, ReportOutcome, Verdict};
+pub use chance::Chance;
 
 pub const OPEN: Fill = Fill::Open { reserved_for: None };
 

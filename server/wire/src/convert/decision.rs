@@ -6,25 +6,11 @@ use chefshat_record::convert::{FieldProblem, check_expression};
 use chefshat_record::outcome::is_by_fallback;
 use prost::Message as _;
 
-use chefshat_room::journal::Source;
 use chefshat_room::{Answer, Answered, ExpressError, Expression, Verdict};
 
 /// Encodes a mask.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
     mask.to_bytes(rules.actions().size())
-}
-
-/// The protocol's name for how a decision came about.
-pub(super) fn source_to_proto(source: Source) -> v1::DecisionSource {
-    match source {
-        Source::Agent => v1::DecisionSource::Agent,
-        Source::Timeout => v1::DecisionSource::Timeout,
-        Source::Invalid => v1::DecisionSource::Invalid,
-        Source::Disconnected => v1::DecisionSource::Disconnected,
-        Source::Substitute => v1::DecisionSource::Substitute,
-        Source::Recorded => v1::DecisionSource::Recorded,
-        Source::Table => v1::DecisionSource::Table,
-    }
 }
 
 /// The result of an answer, as a message.

@@ -9,9 +9,9 @@ use chefshat_record::convert::{
 };
 use prost::Message as _;
 
-use super::kind::kind_to_proto;
 use super::labels::{shown_by, shown_name, shown_policy, shown_substitute};
-use super::room::{abort_reason, seed_commitment, shown_participants};
+use super::mirrored::{Mirrored as _, kind_to_proto};
+use super::room::{seed_commitment, shown_participants};
 use super::table::violation_to_proto;
 use chefshat_room::Core;
 use chefshat_room::log::RoomEvent;
@@ -79,7 +79,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
             })
         }
         RoomEvent::GameAborted(reason) => Kind::GameAborted(Box::new(v1::GameAborted {
-            reason: abort_reason(*reason).into(),
+            reason: reason.to_proto().into(),
             reveal: reveal(core, viewer),
         })),
         RoomEvent::ServerRestarted => Kind::ServerRestarted(v1::ServerRestarted {}),

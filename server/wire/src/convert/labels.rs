@@ -9,8 +9,7 @@ use chefshat_record::convert::By;
 use chefshat_room::Core;
 use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, SeatLabels, Source, StudyGame};
 
-use super::decision::source_to_proto;
-use super::kind::kind_to_proto;
+use super::mirrored::{Mirrored as _, kind_to_proto};
 use super::policy::policy_of;
 
 /// The seats of a room, labelled as its study wants.
@@ -95,11 +94,11 @@ pub(super) fn shown_by(core: &Core, event: &Event, (source, time_us): (Source, u
     };
     match seat.is_some_and(|seat| core.header().is_hidden(seat)) {
         true => By {
-            source: source_to_proto(Source::Agent),
+            source: Source::Agent.to_proto(),
             decision_time_us: 0,
         },
         false => By {
-            source: source_to_proto(source),
+            source: source.to_proto(),
             decision_time_us: time_us,
         },
     }

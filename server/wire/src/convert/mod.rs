@@ -5,9 +5,9 @@
 mod agent;
 mod decision;
 mod event;
-mod kind;
 mod labels;
 mod marker;
+mod mirrored;
 mod name;
 mod physical_record;
 mod players;
@@ -33,8 +33,8 @@ pub use agent::{
 };
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
-pub use kind::{kind_from_proto, kind_to_proto};
 pub use marker::marker_to_proto;
+pub use mirrored::Mirrored;
 pub use name::{MAX_NAME_CHARS, checked_name, name_fingerprint};
 pub use players::recorded_player;
 pub use policy::{
@@ -51,15 +51,15 @@ pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use study::{
     ConditionPlan, MAX_HOSTED_SHIFTS, PARTICIPANT_KIND, StudyPlan, complete_settings,
-    device_from_proto, device_to_proto, game_of, participant_state, room_of, study_participant,
-    study_plan, study_to_proto,
+    device_from_proto, device_to_proto, game_of, room_of, study_participant, study_plan,
+    study_to_proto,
 };
 pub use study_view::{answers_from_proto, answers_to_proto, study_view};
 pub use summary::summary;
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{
     TournamentPlan, is_rated, settings_to_proto, tournament_game, tournament_participants,
-    tournament_plan, tournament_state, tournament_state_from_proto,
+    tournament_plan,
 };
 
 /// Converts a count to the protocol's integer. All counts are bounded far below its limit.

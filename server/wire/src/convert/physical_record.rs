@@ -12,9 +12,9 @@ use chefshat_referee::{Fact, ShiftFacts, ShiftStory};
 use prost::Message as _;
 use tracing::error;
 
-use super::decision::source_to_proto;
 use super::event::event_to_proto;
 use super::marker::last_marker;
+use super::mirrored::Mirrored as _;
 use super::policy::millis;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
@@ -69,15 +69,7 @@ struct Placed {
     place: Place,
     /// The report that made a hand known.
     hand: Option<u64>,
-    entry: RoomEntryOf,
-}
-
-/// An entry of a room, before its record is made.
-#[derive(Clone)]
-enum RoomEntryOf {
-    Event(u64, Kind),
-    Private(v1::PrivateExpression),
-    Marker(v1::Marker),
+    entry: RoomEntry,
 }
 
 impl Room {
@@ -114,7 +106,7 @@ impl Room {
                     room.entries.push(Placed {
                         place: (number, Phase::After),
                         hand: None,
-                        entry: RoomEntryOf::Private(private),
+                        entry: RoomEntry::Private(private),
                     });
                 }
                 _ => {}
@@ -125,7 +117,7 @@ impl Room {
                 room.entries.extend(marker.map(|marker| Placed {
                     place: (number, Phase::After),
                     hand: None,
-                    entry: RoomEntryOf::Marker(marker),
+                    entry: RoomEntry::Marker(marker),
                 }));
             }
         }
@@ -163,7 +155,7 @@ impl Room {
             self.entries.push(Placed {
                 place: (number, phase),
                 hand,
-                entry: RoomEntryOf::Event(elapsed_ms, kind),
+                entry: RoomEntry::Event { elapsed_ms, kind },
             });
         }
     }
@@ -195,16 +187,7 @@ impl Room {
     /// The lines of the record.
     fn record(&self, shifts: &[ShiftStory]) -> Result<Vec<v1::RecordLine>, String> {
         let entries = self.entries.iter();
-        let mut entries: Vec<(Place, RoomEntry)> = entries
-            .map(|it| {
-                let entry = match it.entry.clone() {
-                    RoomEntryOf::Event(elapsed_ms, kind) => RoomEntry::Event { elapsed_ms, kind },
-                    RoomEntryOf::Private(private) => RoomEntry::Private(private),
-                    RoomEntryOf::Marker(marker) => RoomEntry::Marker(marker),
-                };
-                (it.place, entry)
-            })
-            .collect();
+        let mut entries: Vec<_> = entries.map(|it| (it.place, it.entry.clone())).collect();
         let mut latest = 0;
         for (number, seat, action) in shifts.iter().flat_map(|shift| &shift.decisions) {
             // A report that had to wait counts when the one before it does.
@@ -255,7 +238,7 @@ fn decision(entry: &Entry, decided: &Decided, attempts: Vec<u32>) -> v1::Decisio
     let annotations = decided.annotations.as_ref();
     v1::DecisionRecord {
         seat: seat_number(decided.seat),
-        source: source_to_proto(decided.source).into(),
+        source: decided.source.to_proto().into(),
         decision_time_us: decided.time_us,
         bank_left_ms: decided.bank_left_ms,
         invalid_attempts: attempts,

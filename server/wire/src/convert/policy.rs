@@ -7,7 +7,8 @@ use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
 use super::agent::agent_from_proto;
-use super::kind::{kind_from_proto, kind_to_proto};
+use super::mirrored::{Mirrored as _, kind_to_proto};
+use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{
     ABSENCE_TIME_OF_PEOPLE, AbortPolicy, Durability, KindClock, Policy, Visibility,
 };
@@ -65,12 +66,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             .unwrap_or(standard.max_timeouts),
         substitute: agent_from_proto("substitute", &message.substitute)?
             .unwrap_or(standard.substitute),
-        abort: match v1::AbortPolicy::try_from(message.abort) {
-            Ok(v1::AbortPolicy::Unspecified | v1::AbortPolicy::AllLost) => AbortPolicy::AllLost,
-            Ok(v1::AbortPolicy::AnyLost) => AbortPolicy::AnyLost,
-            Ok(v1::AbortPolicy::Never) => AbortPolicy::Never,
-            Err(_) => return Err(FieldProblem::unknown("abort", message.abort)),
-        },
+        abort: AbortPolicy::from_proto("abort", message.abort)?.unwrap_or(standard.abort),
         reward_scheme: v1::RewardScheme::try_from(message.reward_scheme)
             .map(reward_scheme_from_proto)
             .map_err(|_| FieldProblem::unknown("reward_scheme", message.reward_scheme))?,
@@ -82,17 +78,12 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         spectators_see_hands: message
             .spectators_see_hands
             .unwrap_or(standard.spectators_see_hands),
-        durability: match v1::Durability::try_from(message.durability) {
-            Ok(v1::Durability::Unspecified | v1::Durability::Durable) => Durability::Durable,
-            Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
-            Err(_) => return Err(FieldProblem::unknown("durability", message.durability)),
-        },
+        durability: Durability::from_proto("durability", message.durability)?
+            .unwrap_or(standard.durability),
         clocks: clocks(message)?,
         one_seat_per_client: message.one_seat_per_client,
-        visibility: match v1::Visibility::try_from(message.visibility) {
-            Ok(visibility) => visibility_from_proto(visibility),
-            Err(_) => return Err(FieldProblem::unknown("visibility", message.visibility)),
-        },
+        visibility: Visibility::from_proto("visibility", message.visibility)?
+            .unwrap_or(standard.visibility),
         hints: message.hints,
         chat: message.chat,
         absence_time: time("absence_time_ms", message.absence_time_ms, 0..=DAY_MS)?,
@@ -115,12 +106,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
         max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
         max_timeouts: Some(policy.max_timeouts),
         substitute: policy.substitute.name(),
-        abort: match policy.abort {
-            AbortPolicy::AllLost => v1::AbortPolicy::AllLost,
-            AbortPolicy::AnyLost => v1::AbortPolicy::AnyLost,
-            AbortPolicy::Never => v1::AbortPolicy::Never,
-        }
-        .into(),
+        abort: policy.abort.to_proto().into(),
         reward_scheme: reward_scheme_to_proto(policy.reward_scheme).into(),
         pace_ms: policy.pace.map(millis),
         waiting_time_ms: Some(millis(policy.waiting_time)),
@@ -129,11 +115,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
         ),
         spectators_see_hands: Some(policy.spectators_see_hands),
-        durability: match policy.durability {
-            Durability::Durable => v1::Durability::Durable,
-            Durability::Ephemeral => v1::Durability::Ephemeral,
-        }
-        .into(),
+        durability: policy.durability.to_proto().into(),
         clocks: (policy.clocks.iter())
             .map(|clock| v1::KindClock {
                 kind: kind_to_proto(Some(clock.kind)),
@@ -164,17 +146,7 @@ pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
 pub(super) fn visibility_to_proto(visibility: Visibility) -> v1::Visibility {
     match visibility {
         Visibility::Public => v1::Visibility::Unspecified,
-        Visibility::Unlisted => v1::Visibility::Unlisted,
-        Visibility::Private => v1::Visibility::Private,
-    }
-}
-
-/// Who sees a room, tournament or recorded game.
-fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
-    match visibility {
-        v1::Visibility::Unspecified | v1::Visibility::Public => Visibility::Public,
-        v1::Visibility::Unlisted => Visibility::Unlisted,
-        v1::Visibility::Private => Visibility::Private,
+        Visibility::Unlisted | Visibility::Private => visibility.to_proto(),
     }
 }
 
@@ -183,7 +155,7 @@ fn visibility_from_proto(visibility: v1::Visibility) -> Visibility {
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
     for message in &policy.clocks {
-        let kind = kind_from_proto("clocks", message.kind)?
+        let kind = ParticipantKind::from_proto("clocks", message.kind)?
             .ok_or_else(|| FieldProblem::new("clocks", "set the kind of each clock"))?;
         if clocks.iter().any(|clock| clock.kind == kind) {
             return Err(FieldProblem::new("clocks", "a kind has two clocks"));
@@ -251,8 +223,6 @@ fn in_range(
 
 #[cfg(test)]
 mod tests {
-    use chefshat_room::journal::ParticipantKind;
-
     use super::*;
 
     #[test]

@@ -7,10 +7,11 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::{invalid_reward, seat_number};
 use prost::Message as _;
 
-use super::decision::{mask_bytes, source_to_proto};
+use super::decision::mask_bytes;
 use super::event::event_to_proto;
 use super::labels::without_labels;
 use super::marker::last_marker;
+use super::mirrored::Mirrored as _;
 use super::physical_record::physical_record_lines;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
@@ -124,7 +125,7 @@ fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> 
             .into(),
         action: decided.action.index().into(),
         text: rules.actions().text(decided.action).unwrap_or_default(),
-        source: source_to_proto(decided.source).into(),
+        source: decided.source.to_proto().into(),
         decision_time_us: decided.time_us,
         bank_left_ms: decided.bank_left_ms,
         invalid_attempts: attempts.to_vec(),

@@ -11,26 +11,9 @@ use chefshat_record::summary::summary;
 use chefshat_room::ConnectionId;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
-use chefshat_room::testing::{OPEN, Table, ms};
+use chefshat_room::testing::{Chance, OPEN, Table, ms};
 
 use super::{answer_from_proto, record_lines};
-
-/// A small generator of random numbers (SplitMix64).
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (mixed ^ (mixed >> 31)) % bound
-    }
-
-    fn index(&mut self, length: usize) -> usize {
-        usize::try_from(self.below(length as u64)).expect("below the length")
-    }
-}
 
 fn policy(chance: &mut Chance) -> Policy {
     let absence_time = match chance.below(4) {

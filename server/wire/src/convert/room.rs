@@ -9,13 +9,13 @@ use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::agent::agent_from_proto;
-use super::kind::{kind_from_proto, kind_to_proto};
 use super::labels::{labelled, shown_policy};
+use super::mirrored::{Mirrored as _, kind_to_proto};
 use super::name::checked_name;
 use super::policy::millis;
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
+use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Awaited, Core, State};
 
 /// The participants of a new room's seats. An empty list leaves all seats open.
@@ -44,9 +44,9 @@ pub fn fills_from_proto(
         .map(|seat| match &seat.filled_by {
             None => Ok(Fill::Open { reserved_for: None }),
             Some(FilledBy::ReservedFor(kind)) => Ok(Fill::Open {
-                reserved_for: kind_from_proto("seats", *kind)?,
+                reserved_for: ParticipantKind::from_proto("seats", *kind)?,
             }),
-            Some(FilledBy::Wizard(kind)) => match kind_from_proto("seats", *kind)? {
+            Some(FilledBy::Wizard(kind)) => match ParticipantKind::from_proto("seats", *kind)? {
                 Some(ParticipantKind::Human) | None => Err(FieldProblem::new(
                     "seats",
                     "`wizard` is the kind that others see: ROBOT, AGENT or MODEL",
@@ -56,7 +56,7 @@ pub fn fills_from_proto(
                 }),
             },
             Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
-            Some(FilledBy::AtTable(kind)) => kind_from_proto("seats", *kind)?
+            Some(FilledBy::AtTable(kind)) => ParticipantKind::from_proto("seats", *kind)?
                 .map(Fill::AtTable)
                 .ok_or_else(|| {
                     FieldProblem::new("seats", "set the kind of the player at the table")
@@ -221,21 +221,10 @@ pub(super) fn series_id(header: &GameHeader) -> String {
     (header.series()).map_or_else(String::new, |series| series.to_string())
 }
 
-/// The protocol's value for the reason why a game has no result.
-pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
-    match reason {
-        AbortReason::Closed => v1::AbortReason::Closed,
-        AbortReason::Shutdown => v1::AbortReason::Shutdown,
-        AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
-        AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
-        AbortReason::TooLong => v1::AbortReason::TooLong,
-    }
-}
-
 /// Why the game has no result; unspecified if it has one.
 pub(super) fn aborted_because(state: State) -> v1::AbortReason {
     match state {
-        State::Aborted(reason) => abort_reason(reason),
+        State::Aborted(reason) => reason.to_proto(),
         _ => v1::AbortReason::Unspecified,
     }
 }

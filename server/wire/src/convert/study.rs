@@ -19,6 +19,7 @@ use chefshat_study::{
 };
 
 use super::agent::check_budget;
+use super::mirrored::Mirrored as _;
 use super::name::checked_name;
 use super::number;
 use super::policy::{policy_from_proto, policy_to_proto, requested_policy};
@@ -252,11 +253,9 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
                 })
                 .collect(),
             conditions,
-            order: match v1::StudyOrder::try_from(message.order) {
-                Ok(v1::StudyOrder::Unspecified | v1::StudyOrder::Between) => Order::Between,
-                Ok(v1::StudyOrder::Within) => Order::Within,
-                Err(_) => return Err(problem("order", "it is not an order")),
-            },
+            order: Order::from_proto("order", message.order)
+                .map_err(|_| problem("order", "it is not an order"))?
+                .unwrap_or(Order::Between),
             block_size: usize::try_from(message.block_size)
                 .ok()
                 .filter(|size| *size > 0),
@@ -285,7 +284,7 @@ pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
         width: message.width.try_into().ok()?,
         height: message.height.try_into().ok()?,
         pixels: message.pixels.try_into().ok()?,
-        pointer: pointer(message.pointer()),
+        pointer: Pointer::of(message.pointer()),
         time_zone: message.time_zone,
     };
     device.is_valid().then_some(device)
@@ -293,12 +292,7 @@ pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
 
 /// A participant's device as a message.
 pub fn device_to_proto(device: &Device) -> v1::StudyDevice {
-    let pointer = match device.pointer {
-        None => v1::StudyPointer::Unspecified,
-        Some(Pointer::None) => v1::StudyPointer::None,
-        Some(Pointer::Coarse) => v1::StudyPointer::Coarse,
-        Some(Pointer::Fine) => v1::StudyPointer::Fine,
-    };
+    let pointer = (device.pointer).map_or(v1::StudyPointer::Unspecified, Pointer::to_proto);
     v1::StudyDevice {
         width: device.width.into(),
         height: device.height.into(),
@@ -322,30 +316,17 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
 
 fn required_device(message: &v1::StudyRequiredDevice) -> Result<RequiredDevice, SettingsProblem> {
     Ok(RequiredDevice {
-        pointer: match v1::StudyPointer::try_from(message.pointer) {
-            Ok(needed) => pointer(needed),
-            Err(_) => return Err(problem("device.pointer", "choose FINE or COARSE")),
-        },
+        pointer: Pointer::from_proto("pointer", message.pointer)
+            .map_err(|_| problem("device.pointer", "choose FINE or COARSE"))?,
         // The core refuses one that does not fit.
         min_width: u16::try_from(message.min_width).unwrap_or(u16::MAX),
     })
 }
 
-fn pointer(message: v1::StudyPointer) -> Option<Pointer> {
-    match message {
-        v1::StudyPointer::Unspecified => None,
-        v1::StudyPointer::None => Some(Pointer::None),
-        v1::StudyPointer::Coarse => Some(Pointer::Coarse),
-        v1::StudyPointer::Fine => Some(Pointer::Fine),
-    }
-}
-
 fn groups(message: &v1::StudyGroups) -> Result<Groups, SettingsProblem> {
-    let left_over = match v1::StudyLeftOver::try_from(message.left_over) {
-        Ok(v1::StudyLeftOver::Unspecified | v1::StudyLeftOver::Dismiss) => LeftOverPolicy::Dismiss,
-        Ok(v1::StudyLeftOver::Agents) => LeftOverPolicy::Agents,
-        Err(_) => return Err(problem("groups.left_over", "choose DISMISS or AGENTS")),
-    };
+    let left_over = LeftOverPolicy::from_proto("left_over", message.left_over)
+        .map_err(|_| problem("groups.left_over", "choose DISMISS or AGENTS"))?
+        .unwrap_or(LeftOverPolicy::Dismiss);
     if !GROUP_SIZES.contains(&message.size) {
         let (least, most) = (GROUP_SIZES.start(), GROUP_SIZES.end());
         let words = format!("{} is not within {least}..={most}", message.size);
@@ -412,14 +393,8 @@ fn condition_of(
         let words = format!("{behaviour} characters are more than {MAX_ROBOT_BEHAVIOUR}");
         return Err(problem(format!("{field}.robot_behaviour"), words));
     }
-    let (labels, shown) = match v1::StudyLabels::try_from(message.labels) {
-        Ok(v1::StudyLabels::Unspecified | v1::StudyLabels::AsTheyAre) => {
-            (Labels::AsTheyAre, SeatLabels::AsTheyAre)
-        }
-        Ok(v1::StudyLabels::Kinds) => (Labels::Kinds, SeatLabels::Kinds),
-        Ok(v1::StudyLabels::Players) => (Labels::Players, SeatLabels::Players),
-        Err(_) => return Err(problem(format!("{field}.labels"), "they are not labels")),
-    };
+    let labels = v1::StudyLabels::try_from(message.labels)
+        .map_err(|_| problem(format!("{field}.labels"), "they are not labels"))?;
     let condition = Condition {
         id: message.id.clone(),
         levels: (message.levels.iter())
@@ -429,7 +404,7 @@ fn condition_of(
         participant_seat: (message.participant_seat)
             .map(|seat| usize::try_from(seat).unwrap_or(usize::MAX)),
         hide: hidden(&format!("{field}.hide"), &message.hide)?,
-        labels,
+        labels: Labels::of(labels).unwrap_or_default(),
         seeds: seeds(&format!("{field}.seeds"), &message.seeds)?,
     };
     let plan = ConditionPlan {
@@ -440,22 +415,15 @@ fn condition_of(
         names,
         wizards: wizards_from_proto(&message.seats),
         robot_behaviour: message.robot_behaviour.clone(),
-        labels: shown,
+        labels: SeatLabels::of(labels).unwrap_or_default(),
     };
     Ok((condition, plan))
 }
 
 fn hidden(field: &str, messages: &[i32]) -> Result<BTreeSet<Hide>, SettingsProblem> {
-    let hide = |message: &i32| match v1::StudyHide::try_from(*message) {
-        Ok(v1::StudyHide::Log) => Ok(Hide::Log),
-        Ok(v1::StudyHide::Lookup) => Ok(Hide::Lookup),
-        Ok(v1::StudyHide::Expressions) => Ok(Hide::Expressions),
-        Ok(v1::StudyHide::Played) => Ok(Hide::Played),
-        Ok(v1::StudyHide::Pages) => Ok(Hide::Pages),
-        Ok(v1::StudyHide::Unspecified) | Err(_) => Err(problem(
-            field,
-            format!("{message} is not a part of the page"),
-        )),
+    let hide = |message: &i32| {
+        let part = Hide::from_proto("hide", *message).ok().flatten();
+        part.ok_or_else(|| problem(field, format!("{message} is not a part of the page")))
     };
     messages.iter().map(hide).collect()
 }
@@ -761,7 +729,7 @@ pub fn study_participant(
     Some(v1::StudyParticipant {
         number: number_of,
         pseudonym: participant.pseudonym.clone(),
-        state: participant_state(participant.status).into(),
+        state: participant.status.to_proto().into(),
         slot: participant.slot,
         conditions: (sequence.iter())
             .map(|condition| conditions[*condition].id.clone())
@@ -828,20 +796,6 @@ fn study_game(
             true => condition.robot_behaviour.clone(),
             false => String::new(),
         },
-    }
-}
-
-/// The state of a participant as a message.
-pub fn participant_state(status: Status) -> v1::StudyParticipantState {
-    match status {
-        Status::Invited => v1::StudyParticipantState::Invited,
-        Status::Active => v1::StudyParticipantState::Active,
-        Status::Completed => v1::StudyParticipantState::Completed,
-        Status::Withdrawn => v1::StudyParticipantState::Withdrawn,
-        Status::DroppedOut => v1::StudyParticipantState::DroppedOut,
-        Status::Removed => v1::StudyParticipantState::Removed,
-        Status::ScreenedOut => v1::StudyParticipantState::ScreenedOut,
-        Status::LeftOver => v1::StudyParticipantState::LeftOver,
     }
 }
 

@@ -4,10 +4,10 @@
 use chefshat_proto::v1::{self, study_item, study_item_answer, study_shown_item, study_view};
 use chefshat_room::ids::{GameId, RoomId};
 use chefshat_study::{
-    Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownItemIf, ShownQuestionnaire,
-    View,
+    Answer, Content, ItemAnswer, ShownGame, ShownItem, ShownItemIf, ShownQuestionnaire, View,
 };
 
+use super::mirrored::Mirrored as _;
 use super::number;
 use super::study::{answer_set_to_proto, item_kind};
 
@@ -47,7 +47,7 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(RoomId) -> String) -> v1::S
                 wait_ms: arrival.wait_ms,
             }),
             Content::End { reason, url, text } => Message::End(v1::StudyEnd {
-                reason: end_reason(reason).into(),
+                reason: reason.to_proto().into(),
                 url: url.unwrap_or_default(),
                 text,
             }),
@@ -98,36 +98,19 @@ fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(RoomId) -> String) -> v1:
             (room.to_string(), game.to_string(), ticket_of(room))
         }
     };
-    let hide = game.hide.iter().map(|part| match part {
-        Hide::Log => v1::StudyHide::Log,
-        Hide::Lookup => v1::StudyHide::Lookup,
-        Hide::Expressions => v1::StudyHide::Expressions,
-        Hide::Played => v1::StudyHide::Played,
-        Hide::Pages => v1::StudyHide::Pages,
-    });
     v1::StudyShownGame {
         practice: game.practice,
         game: game.game,
         games: game.games,
-        hide: hide.map(i32::from).collect(),
+        hide: (game.hide.iter())
+            .map(|part| part.to_proto().into())
+            .collect(),
         room_id,
         game_id,
         ticket,
         ended: game.ended,
         labelled: game.labelled,
         waits_for: game.waits_for,
-    }
-}
-
-fn end_reason(end: End) -> v1::StudyEndReason {
-    match end {
-        End::Completed => v1::StudyEndReason::Completed,
-        End::Withdrawn => v1::StudyEndReason::Withdrawn,
-        End::DataDeleted => v1::StudyEndReason::DataDeleted,
-        End::DroppedOut => v1::StudyEndReason::DroppedOut,
-        End::Removed => v1::StudyEndReason::Removed,
-        End::ScreenedOut => v1::StudyEndReason::ScreenedOut,
-        End::LeftOver => v1::StudyEndReason::LeftOver,
     }
 }
 

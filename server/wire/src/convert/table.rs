@@ -10,10 +10,11 @@ use chefshat_record::convert::{
     seat_from_number, seat_number,
 };
 use chefshat_referee::counts::{Counts, JOKER};
-use chefshat_referee::{Question, Report, SeenCards, Stage, ToLay, ViolatedRule, Violation};
+use chefshat_referee::{Question, Report, SeenCards, Stage, ToLay, Violation};
 use chefshat_room::journal::{Fill, ReportSource, Reported};
 use chefshat_room::{Core, PhysicalTable, ReportOutcome, ReportVerdict, State};
 
+use super::mirrored::Mirrored as _;
 use super::name::checked_text;
 use super::room::describe;
 
@@ -73,12 +74,7 @@ pub fn reported_from_proto(
     }
     Ok(Reported {
         id: checked_text("report_id", report_id, 1..=MAX_ID)?,
-        source: match v1::ReportSource::try_from(message.source) {
-            Ok(v1::ReportSource::Unspecified | v1::ReportSource::Camera) => ReportSource::Camera,
-            Ok(v1::ReportSource::Attendant) => ReportSource::Attendant,
-            Ok(v1::ReportSource::Robot) => ReportSource::Robot,
-            Err(_) => return Err(FieldProblem::unknown("source", message.source)),
-        },
+        source: ReportSource::from_proto("source", message.source)?.unwrap_or(ReportSource::Camera),
         age: Duration::from_millis(message.age_ms.into()),
         report: report_from_proto(message, deck)?,
     })
@@ -254,17 +250,9 @@ fn table_report(
     deck: Deck,
 ) -> v1::TableReport {
     v1::TableReport {
-        source: source_to_proto(source).into(),
+        source: source.to_proto().into(),
         age_ms: u32::try_from(age.as_millis()).unwrap_or(u32::MAX),
         kind: Some(kind_of_report(report, deck)),
-    }
-}
-
-fn source_to_proto(source: ReportSource) -> v1::ReportSource {
-    match source {
-        ReportSource::Camera => v1::ReportSource::Camera,
-        ReportSource::Attendant => v1::ReportSource::Attendant,
-        ReportSource::Robot => v1::ReportSource::Robot,
     }
 }
 
@@ -356,23 +344,9 @@ fn answer_to_proto(question: &str, option: Option<usize>) -> v1::QuestionAnswere
 
 /// A violation that a report stated.
 pub(super) fn violation_to_proto(report: u64, violation: &Violation) -> v1::Violation {
-    let rule = match violation.rule {
-        ViolatedRule::Turn => v1::ViolatedRule::Turn,
-        ViolatedRule::Face => v1::ViolatedRule::Face,
-        ViolatedRule::Size => v1::ViolatedRule::Size,
-        ViolatedRule::Form => v1::ViolatedRule::Form,
-        ViolatedRule::Opening => v1::ViolatedRule::Opening,
-        ViolatedRule::Pass => v1::ViolatedRule::Pass,
-        ViolatedRule::Cards => v1::ViolatedRule::Cards,
-        ViolatedRule::SpecialAction => v1::ViolatedRule::SpecialAction,
-        ViolatedRule::Gift => v1::ViolatedRule::Gift,
-        ViolatedRule::Role => v1::ViolatedRule::Role,
-        ViolatedRule::Decision => v1::ViolatedRule::Decision,
-        ViolatedRule::Correction => v1::ViolatedRule::Correction,
-    };
     v1::Violation {
         seat: violation.seat.map(seat_number),
-        rule: rule.into(),
+        rule: violation.rule.to_proto().into(),
         text: violation.text.clone(),
         report,
     }

@@ -6,11 +6,11 @@ use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
 use chefshat_referee::Referee;
 use chefshat_tournament::{
-    Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, State, Tournament,
+    Deals, Format, Game, GameState, MAX_PARTICIPANTS, ParticipantKind, Settings, Tournament,
 };
 
 use super::agent::{agent_from_proto, check_real_cards};
-use super::kind::{kind_from_proto, kind_to_proto};
+use super::mirrored::{Mirrored as _, kind_to_proto};
 use super::number;
 use super::policy::{policy_from_proto, policy_to_proto};
 use chefshat_room::ids::{GameId, RoomId, SeriesId};
@@ -52,7 +52,7 @@ pub fn tournament_plan(
 ) -> Result<TournamentPlan, FieldProblem> {
     let rules = rules_from_proto(&message.rules.clone().unwrap_or_default())
         .map_err(|problem| FieldProblem::new("rules", problem.to_string()))?;
-    let deals = deals_from_proto(message.deals)?;
+    let deals = Deals::from_proto("deals", message.deals)?.unwrap_or_default();
     let standard = |value: u32, standard: u32| if value == 0 { standard } else { value };
     let count = |value: u32| usize::try_from(value).unwrap_or(usize::MAX);
     let no_show_ms = standard(message.no_show_time_ms, DEFAULT_NO_SHOW_MS);
@@ -90,7 +90,8 @@ pub fn tournament_plan(
     }
     Ok(TournamentPlan {
         core: Settings {
-            format: format_from_proto(message.format)?,
+            format: Format::from_proto("format", message.format)?
+                .ok_or_else(|| FieldProblem::new("format", "set knockout, round robin or swiss"))?,
             players: rules.players(),
             points: rules.points_slice().to_vec(),
             rounds: (message.rounds != 0).then_some(message.rounds),
@@ -109,7 +110,7 @@ pub fn tournament_plan(
         policy,
         kinds: (message.kinds.iter())
             .map(|kind| {
-                kind_from_proto("kinds", *kind)?
+                ParticipantKind::from_proto("kinds", *kind)?
                     .ok_or_else(|| FieldProblem::new("kinds", "a kind is unspecified"))
             })
             .collect::<Result<_, _>>()?,
@@ -168,51 +169,17 @@ fn policy(
     Ok(policy)
 }
 
-fn format_from_proto(format: i32) -> Result<Format, FieldProblem> {
-    match v1::TournamentFormat::try_from(format) {
-        Ok(v1::TournamentFormat::Knockout) => Ok(Format::Knockout),
-        Ok(v1::TournamentFormat::RoundRobin) => Ok(Format::RoundRobin),
-        Ok(v1::TournamentFormat::Swiss) => Ok(Format::Swiss),
-        Ok(v1::TournamentFormat::Unspecified) => Err(FieldProblem::new(
-            "format",
-            "set knockout, round robin or swiss",
-        )),
-        Err(_) => Err(FieldProblem::unknown("format", format)),
-    }
-}
-
-fn deals_from_proto(deals: i32) -> Result<Deals, FieldProblem> {
-    match v1::TournamentDeals::try_from(deals) {
-        Ok(v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent) => {
-            Ok(Deals::Independent)
-        }
-        Ok(v1::TournamentDeals::SameAtAllTables) => Ok(Deals::SameAtAllTables),
-        Ok(v1::TournamentDeals::Rotated) => Ok(Deals::Rotated),
-        Err(_) => Err(FieldProblem::unknown("deals", deals)),
-    }
-}
-
 /// The settings of a tournament, every field set.
 pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSettings {
     let core = &plan.core;
     v1::TournamentSettings {
         name: name.to_owned(),
-        format: match core.format {
-            Format::Knockout => v1::TournamentFormat::Knockout,
-            Format::RoundRobin => v1::TournamentFormat::RoundRobin,
-            Format::Swiss => v1::TournamentFormat::Swiss,
-        }
-        .into(),
+        format: core.format.to_proto().into(),
         rules: Some(rules_to_proto(&plan.rules)),
         policy: Some(policy_to_proto(&plan.policy)),
         rounds: core.rounds.unwrap_or(0),
         games_per_pairing: core.games_per_pairing,
-        deals: match core.deals {
-            Deals::Independent => v1::TournamentDeals::Independent,
-            Deals::SameAtAllTables => v1::TournamentDeals::SameAtAllTables,
-            Deals::Rotated => v1::TournamentDeals::Rotated,
-        }
-        .into(),
+        deals: core.deals.to_proto().into(),
         kinds: (plan.kinds.iter())
             .map(|kind| kind_to_proto(Some(*kind)))
             .collect(),
@@ -227,34 +194,6 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
         deal_seed: (plan.deal_seed).map_or_else(Vec::new, |seed| seed.to_vec()),
         physical_tables: number(core.physical_tables),
         start_at_ms: plan.start_at_ms.unwrap_or(0),
-    }
-}
-
-/// The state of a tournament as a message.
-pub fn tournament_state(state: State) -> v1::TournamentState {
-    match state {
-        State::Open => v1::TournamentState::Open,
-        State::Playing => v1::TournamentState::Playing,
-        State::Finished => v1::TournamentState::Finished,
-        State::Closed => v1::TournamentState::Closed,
-    }
-}
-
-/// A state from the protocol; `None` if it is unset.
-///
-/// # Errors
-/// The number is not a state.
-pub fn tournament_state_from_proto(
-    field: &'static str,
-    state: i32,
-) -> Result<Option<State>, FieldProblem> {
-    match v1::TournamentState::try_from(state) {
-        Ok(v1::TournamentState::Unspecified) => Ok(None),
-        Ok(v1::TournamentState::Open) => Ok(Some(State::Open)),
-        Ok(v1::TournamentState::Playing) => Ok(Some(State::Playing)),
-        Ok(v1::TournamentState::Finished) => Ok(Some(State::Finished)),
-        Ok(v1::TournamentState::Closed) => Ok(Some(State::Closed)),
-        Err(_) => Err(FieldProblem::unknown(field, state)),
     }
 }
 

@@ -43,22 +43,53 @@ fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<B
     Some(hands)
 }
 
+/// A seat for a program.
+const AGENT: Fill = Fill::Open {
+    reserved_for: Some(ParticipantKind::Agent),
+};
+
+/// What was sent to a viewer from a position in the log on: the events, and the open decision if it
+/// is that of `own`.
+pub(super) fn sent_since(
+    from: usize,
+    table: &Table,
+    own: Option<Seat>,
+    see: Viewer,
+) -> Vec<Vec<u8>> {
+    let core = &table.core;
+    let events = (from..core.log().len())
+        .filter_map(|position| convert::event_to_proto(core, position, see))
+        .map(|event| event.encode_to_vec());
+    let open = (core.awaited()).filter(|open| own == Some(open.decision.seat));
+    let written = |open| encoded(core, open, table.now, true);
+    events.chain(open.map(written)).collect()
+}
+
+fn encoded(core: &Core, open: &OpenDecision, now: Duration, with_mask: bool) -> Vec<u8> {
+    let mut written = Vec::new();
+    crate::encoded::encode_decision(core, open, now, with_mask, &mut written);
+    written
+}
+
 /// Everything sent to the viewer: all events, and the open decision if it is the viewer's.
 fn sent_to(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
-    let mut messages: Vec<Vec<u8>> = (0..table.core.log().len())
-        .filter_map(|position| convert::event_to_proto(&table.core, position, see))
-        .map(|event| event.encode_to_vec())
-        .collect();
-    if let Some(open) = table
-        .core
-        .awaited()
-        .filter(|open| open.decision.seat == viewer)
-    {
-        let mut written = Vec::new();
-        crate::encoded::encode_decision(&table.core, open, table.now, true, &mut written);
-        messages.push(written);
-    }
-    messages
+    sent_since(0, table, Some(viewer), see)
+}
+
+/// The events of the record.
+fn recorded(table: &Table) -> impl Iterator<Item = v1::game_event::Kind> {
+    let lines = convert::record_lines(table.core.header(), &table.journal);
+    lines.into_iter().filter_map(|line| match line.line {
+        Some(v1::record_line::Line::Event(event)) => event.kind,
+        _ => None,
+    })
+}
+
+/// The events of the log, unredacted.
+fn logged(table: &Table, from: usize) -> impl Iterator<Item = v1::game_event::Kind> {
+    (from..table.core.log().len()).filter_map(|position| {
+        convert::event_to_proto(&table.core, position, Viewer::Everything)?.kind
+    })
 }
 
 /// Two tables that differ in two hidden cards, as if they had been dealt so.
@@ -144,10 +175,7 @@ fn hidden_cards_do_not_change_what_is_sent() {
 
 /// A table of four agents, of which a person plays these seats.
 fn with_wizards(wizards: &[usize]) -> Table {
-    let agents = Fill::Open {
-        reserved_for: Some(ParticipantKind::Agent),
-    };
-    let mut table = Table::empty(Policy::default(), vec![agents; 4]);
+    let mut table = Table::empty(Policy::default(), vec![AGENT; 4]);
     let mut header = GameHeader::clone(table.core.header());
     header.wizards = wizards.iter().copied().collect();
     table.core = Core::new(Arc::new(header));
@@ -297,10 +325,7 @@ fn shown_of(table: &Table) -> Shown {
 /// the same at the same times. Returns the games, and what was shown at every moment of them.
 fn with_both_fills(hidden: &Hidden) -> [(Table, Shown); 2] {
     let built_in = hidden.room(Fill::BuiltIn(AgentKind::Greedy.into()));
-    let agents = Fill::Open {
-        reserved_for: Some(ParticipantKind::Agent),
-    };
-    let mut both = [(built_in, Vec::new()), (hidden.room(agents), Vec::new())];
+    let mut both = [(built_in, Vec::new()), (hidden.room(AGENT), Vec::new())];
     let note = |both: &mut [(Table, Vec<_>); 2]| {
         for (table, shown) in both {
             shown.extend(shown_of(table));
@@ -387,24 +412,29 @@ fn first_difference([(_, one), (_, other)]: &[(Table, Shown); 2]) -> Result<usiz
     }
 }
 
+/// Plays a game with both fills, in which nothing that is shown may differ and whose records replay.
+fn same_with_both_fills(hidden: &Hidden, least: usize) -> [(Table, Shown); 2] {
+    let both = with_both_fills(hidden);
+    let compared = first_difference(&both).unwrap_or_else(|what| {
+        panic!("{what} differs: {hidden:?}");
+    });
+    assert!(compared > least, "only {compared} messages: {hidden:?}");
+    for (table, _) in &both {
+        table.assert_replays();
+        let lines = convert::record_lines(table.core.header(), &table.journal);
+        replay(&lines).unwrap_or_else(|error| panic!("{error}: {hidden:?}"));
+    }
+    both
+}
+
 #[test]
 fn what_fills_a_hidden_seat_of_a_study_does_not_change_what_is_shown() {
     for labels in [SeatLabels::Kinds, SeatLabels::Players] {
-        let both = with_both_fills(&Hidden::new(labels));
-        let compared = first_difference(&both).unwrap_or_else(|what| {
-            panic!("{what} differs with {labels:?}");
-        });
-        assert!(compared > 2_000, "only {compared} messages");
-        assert!(both[1].0.core.state().is_over(), "the same game");
-        let [(built_in, _), (programs, _)] = both;
+        let [(built_in, _), (programs, _)] = same_with_both_fills(&Hidden::new(labels), 2_000);
+        assert!(programs.core.state().is_over(), "the same game");
         // The record has what is true, for the owner of the study.
         let times = |table: &Table| {
-            let lines = convert::record_lines(table.core.header(), &table.journal);
-            let events = lines.into_iter().filter_map(|line| match line.line {
-                Some(v1::record_line::Line::Event(event)) => event.kind,
-                _ => None,
-            });
-            let plays = events.filter_map(|kind| match kind {
+            let plays = recorded(table).filter_map(|kind| match kind {
                 v1::game_event::Kind::Play(play) if play.seat > 0 => Some(play.decision_time_us),
                 _ => None,
             });
@@ -444,24 +474,15 @@ fn what_fills_a_hidden_seat_of_a_study_does_not_change_when_it_is_shown() {
                 let mut hidden = Hidden::new(SeatLabels::Players);
                 (hidden.jokers, hidden.leaves) = (jokers, leaves);
                 (hidden.policy.pace, hidden.policy.abort) = (Some(ms(pace)), abort);
-                let both = with_both_fills(&hidden);
-                let compared = first_difference(&both).unwrap_or_else(|what| {
-                    panic!("{what} differs: {hidden:?}");
-                });
-                assert!(compared > 200, "only {compared} messages: {hidden:?}");
-                let silent = both[1].0.core.header().rules.actions();
+                let [_, (programs, _)] = same_with_both_fills(&hidden, 200);
+                let silent = programs.core.header().rules.actions();
                 let silent = [silent.decline(), silent.declare()];
-                for entry in &both[1].0.journal {
+                for entry in &programs.journal {
                     if let Change::Decided(it) = &entry.change
                         && silent.contains(&it.action)
                     {
                         decided[usize::from(it.seat == Seat::new(0))] += 1;
                     }
-                }
-                for (table, _) in &both {
-                    table.assert_replays();
-                    let lines = convert::record_lines(table.core.header(), &table.journal);
-                    replay(&lines).unwrap_or_else(|error| panic!("{error}: {hidden:?}"));
                 }
             }
         }
@@ -477,15 +498,7 @@ fn who_else_of_a_group_plays_does_not_change_what_is_shown() {
             let mut hidden = Hidden::new(SeatLabels::Players);
             (hidden.jokers, hidden.leaves, hidden.grouped) = (jokers, leaves, true);
             hidden.policy.pace = Some(ms(pace));
-            let both = with_both_fills(&hidden);
-            let compared =
-                first_difference(&both).unwrap_or_else(|what| panic!("{what} differs: {hidden:?}"));
-            assert!(compared > 200, "only {compared} messages: {hidden:?}");
-            for (table, _) in &both {
-                table.assert_replays();
-                let lines = convert::record_lines(table.core.header(), &table.journal);
-                replay(&lines).unwrap_or_else(|error| panic!("{error}: {hidden:?}"));
-            }
+            same_with_both_fills(&hidden, 200);
         }
     }
 }
@@ -495,9 +508,7 @@ fn who_else_of_a_group_plays_does_not_change_what_is_shown() {
 fn that_the_participant_of_a_hidden_seat_has_left_is_not_shown() {
     let mut hidden = Hidden::new(SeatLabels::Players);
     hidden.grouped = true;
-    let mut table = hidden.room(Fill::Open {
-        reserved_for: Some(ParticipantKind::Agent),
-    });
+    let mut table = hidden.room(AGENT);
     for seat in [1, SECOND, 3] {
         assert_eq!(table.join(hidden.kind_of(seat)), Ok(Seat::new(seat)));
         table.attach(Seat::new(seat));
@@ -510,34 +521,27 @@ fn that_the_participant_of_a_hidden_seat_has_left_is_not_shown() {
     while !table.core.pending().iter().any(|it| is_retired(&it.change)) {
         table.pass_time(ms(50));
     }
-    let events = (told..table.core.log().len()).filter_map(|position| {
-        convert::event_to_proto(&table.core, position, Viewer::Everything)?.kind
-    });
-    let substituted =
-        |kind: &v1::game_event::Kind| matches!(kind, v1::game_event::Kind::Substituted(_));
-    assert!(!events.into_iter().any(|kind| substituted(&kind)));
+    let substituted = |kind| matches!(kind, v1::game_event::Kind::Substituted(_));
+    assert!(!logged(&table, told).any(substituted));
     let room = convert::describe_at(&table.core, table.now);
     assert!(room.seats.iter().all(|seat| !seat.substituted));
 }
 
 #[test]
 fn in_a_hidden_study_the_first_gift_is_asked_for_at_the_same_time_whatever_fills_the_seats() {
-    let agents = Fill::Open {
-        reserved_for: Some(ParticipantKind::Agent),
-    };
     let built_in = Fill::BuiltIn(AgentKind::Greedy.into());
     // The participant's own time limits the phase, not that of a program.
     for (pace, ends) in [(150, 1_500), (300, 2_000)] {
         // Nobody is offered a special action, or a program thinks before it declines, or lets it run
         // out.
-        let cases = [(built_in, None), (agents, None)].into_iter();
-        let thinking = [0, 700, 9_000].map(|thinks| (agents, Some(thinks)));
+        let cases = [(built_in, None), (AGENT, None)].into_iter();
+        let thinking = [0, 700, 9_000].map(|thinks| (AGENT, Some(thinks)));
         for (others, thinks) in cases.chain(thinking) {
             let mut hidden = Hidden::new(SeatLabels::Players);
             hidden.jokers = Some(thinks.map_or([1, 2], |_| [2, 2]));
             hidden.policy.pace = Some(ms(pace));
             let mut table = hidden.room(others);
-            if others == agents {
+            if others == AGENT {
                 for _ in 1..4 {
                     let seat = table.join(ParticipantKind::Agent).expect("a free seat");
                     table.attach(seat);
@@ -573,10 +577,7 @@ fn in_a_hidden_study_the_first_gift_is_asked_for_at_the_same_time_whatever_fills
 
 #[test]
 fn of_a_hidden_seat_only_what_it_plays_is_shown() {
-    let agents = Fill::Open {
-        reserved_for: Some(ParticipantKind::Agent),
-    };
-    let mut table = Hidden::new(SeatLabels::Players).room(agents);
+    let mut table = Hidden::new(SeatLabels::Players).room(AGENT);
     for _ in 1..4 {
         table.join(ParticipantKind::Agent).expect("a free seat");
     }
@@ -623,18 +624,10 @@ fn of_a_hidden_seat_only_what_it_plays_is_shown() {
         v1::game_event::Kind::Returned(it) => Some(("returned", it.seat)),
         _ => None,
     };
-    let events = (0..table.core.log().len()).filter_map(|position| {
-        convert::event_to_proto(&table.core, position, Viewer::Everything)?.kind
-    });
-    let shown: Vec<_> = events.filter_map(presence).collect();
+    let shown: Vec<_> = logged(&table, 0).filter_map(presence).collect();
     assert_eq!(shown, [("substituted", 0), ("returned", 0)]);
     // The record has both.
-    let lines = convert::record_lines(table.core.header(), &table.journal);
-    let events = lines.into_iter().filter_map(|line| match line.line {
-        Some(v1::record_line::Line::Event(event)) => event.kind,
-        _ => None,
-    });
-    let recorded: Vec<_> = events.filter_map(presence).collect();
+    let recorded: Vec<_> = recorded(&table).filter_map(presence).collect();
     for seat in [0, 2] {
         assert!(recorded.contains(&("substituted", seat)), "{recorded:?}");
         assert_eq!(
@@ -702,14 +695,7 @@ fn a_directly_encoded_decision_equals_the_encoded_message() {
         while let Some(open) = table.core.open().cloned() {
             for with_mask in [true, false] {
                 let message = decision_request(&table.core, &open, table.now, with_mask);
-                let mut written = Vec::new();
-                crate::encoded::encode_decision(
-                    &table.core,
-                    &open,
-                    table.now,
-                    with_mask,
-                    &mut written,
-                );
+                let written = encoded(&table.core, &open, table.now, with_mask);
                 assert_eq!(written, message.encode_to_vec());
             }
             decisions += 1;

@@ -13,39 +13,15 @@ use chefshat_engine::{
 };
 use chefshat_room::journal::{Change, Fill, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
-use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, with_jokers_at};
+use chefshat_room::testing::{Chance, OPEN, Table, dealt, ms, second_shift, with_jokers_at};
 use chefshat_room::{ConnectionId, Core};
 use prost::Message as _;
 
+use super::hidden_tests::sent_since;
 use crate::convert;
 
 /// How many pairs are played, unless `CHEFSHAT_PAIRS` says another number.
 const PAIRS: u64 = 3_000;
-
-/// A small generator of random numbers (SplitMix64).
-struct Chance(u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn below(&mut self, bound: u64) -> u64 {
-        self.next() % bound
-    }
-
-    fn index(&mut self, length: usize) -> usize {
-        usize::try_from(self.below(length as u64)).expect("below the length")
-    }
-
-    fn pick<T: Clone>(&mut self, values: &[T]) -> T {
-        values[self.index(values.len())].clone()
-    }
-}
 
 /// One of the two games, with what was compared so far.
 struct World {
@@ -148,18 +124,11 @@ impl World {
     /// Everything sent to a viewer since the last comparison, with its time.
     fn sent_to(&self, see: Viewer, leak: Leak) -> Vec<Vec<u8>> {
         let core = &self.table.core;
-        let mut messages: Vec<Vec<u8>> = (self.seen..core.log().len())
-            .filter_map(|position| convert::event_to_proto(core, position, see))
-            .map(|event| event.encode_to_vec())
-            .collect();
-        let own = core
-            .awaited()
-            .filter(|open| see == Viewer::Seat(open.decision.seat));
-        if let Some(open) = own {
-            let mut written = Vec::new();
-            crate::encoded::encode_decision(core, open, self.table.now, true, &mut written);
-            messages.push(written);
-        }
+        let own = match see {
+            Viewer::Seat(seat) => Some(seat),
+            Viewer::Spectator | Viewer::Everything => None,
+        };
+        let mut messages = sent_since(self.seen, &self.table, own, see);
         let awaited = core.awaited_in_public();
         let awaited = awaited.filter(|it| see != Viewer::Seat(it.seat));
         messages.push(convert::awaited_to_proto(awaited, self.table.now).encode_to_vec());
@@ -420,7 +389,7 @@ fn step(plan: &Plan, worlds: &mut [World; 2], chance: &mut Chance) {
         .map(|action| action.index().into())
         .collect();
     let illegal = u32::from(worlds[0].table.core.header().rules.actions().size());
-    let (what, time, pick) = (chance.below(12), ms(chance.below(900)), chance.next());
+    let (what, time, pick) = (chance.below(12), ms(chance.below(900)), chance.draw());
     let other = Seat::new(chance.index(worlds[0].connections.len()));
     for world in worlds {
         match what {

@@ -3,7 +3,7 @@
 //! received no faster than the furthest reader reads it.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use bytes::Bytes;
 use chefshat_proto::v1;
@@ -18,6 +18,7 @@ use tonic::body::Body;
 use super::message::{Message, Messages};
 use crate::grpc::status::{room_gone, spectator_too_slow};
 use chefshat_admission::limits::{CallLimits, HISTORY_STEP, Key, Permit};
+use chefshat_base::lock::Lock;
 use chefshat_wire::convert;
 
 /// Most bytes of a stream that are kept for those who read slowly or come later.
@@ -35,7 +36,7 @@ pub(super) struct SharedStream {
     limits: Arc<CallLimits>,
     /// Who is charged for what is kept.
     key: Key,
-    log: Mutex<Log>,
+    log: Lock<Log>,
     /// Notified of what the readers wait for.
     grown: Notify,
     /// Notified of what the receiver waits for.
@@ -178,7 +179,7 @@ impl SharedStream {
         Arc::new(Self {
             limits,
             key,
-            log: Mutex::default(),
+            log: Lock::default(),
             grown: Notify::new(),
             read: Notify::new(),
             others: watch::Sender::default(),
@@ -195,13 +196,9 @@ impl SharedStream {
         (self.others).send_if_modified(|known| std::mem::replace(known, others) != others);
     }
 
-    fn log(&self) -> MutexGuard<'_, Log> {
-        (self.log.lock()).expect("nothing panics under this lock")
-    }
-
     /// A reader of everything from the first message on, if all of it is kept.
     pub(super) fn reader(self: &Arc<Self>) -> Option<Reader> {
-        let mut log = self.log();
+        let mut log = self.log.lock();
         if log.first > 0 || log.end == Some(End::Broken) {
             return None;
         }
@@ -221,25 +218,25 @@ impl SharedStream {
 
     /// Sets the answer of the other node.
     pub(super) fn answered(&self, status: StatusCode, headers: HeaderMap) {
-        self.log().head = Some((status, headers));
+        self.log.lock().head = Some((status, headers));
         self.grown.notify_waiters();
     }
 
     /// Ends the stream for those who wait for its answer, if there is none.
     pub(super) fn end_unanswered(&self) {
-        if self.log().head.is_none() {
+        if self.log.lock().head.is_none() {
             self.end(End::Broken);
         }
     }
 
     fn end(&self, end: End) {
-        self.log().end.get_or_insert(end);
+        self.log.lock().end.get_or_insert(end);
         self.grown.notify_waiters();
     }
 
     fn add(&self, content: Content) {
         let memory = || self.limits.keep_history(self.key);
-        self.log().add(content, memory);
+        self.log.lock().add(content, memory);
         self.grown.notify_waiters();
     }
 
@@ -248,7 +245,7 @@ impl SharedStream {
         let mut messages = Messages::default();
         loop {
             let may_receive = {
-                let mut log = self.log();
+                let mut log = self.log.lock();
                 if log.readers.is_empty() {
                     log.end = Some(End::Broken);
                     return;
@@ -315,7 +312,7 @@ impl Reader {
             tokio::pin!(grown);
             grown.as_mut().enable();
             {
-                let log = self.stream.log();
+                let log = self.stream.log.lock();
                 if log.head.is_some() || log.end.is_some() {
                     return log.head.clone();
                 }
@@ -341,7 +338,7 @@ impl Reader {
     }
 
     fn read(&mut self) -> Read {
-        let mut log = self.stream.log();
+        let mut log = self.stream.log.lock();
         let piece = match log.get(self.next) {
             Err(NotKept) => return Read::End(Some(spectator_too_slow())),
             Ok(None) => match log.end {
@@ -371,7 +368,7 @@ impl Reader {
 
 impl Drop for Reader {
     fn drop(&mut self) {
-        let mut log = self.stream.log();
+        let mut log = self.stream.log.lock();
         log.readers.remove(&self.number);
         log.find_furthest();
         self.stream.count(&log);

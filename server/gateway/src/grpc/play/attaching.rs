@@ -8,7 +8,6 @@ use std::task::{Context, Poll};
 
 use chefshat_engine::MAX_ENTROPY;
 use chefshat_proto::v1;
-use chefshat_record::convert::FieldProblem;
 use tokio::time::Instant;
 use tokio_util::task::AbortOnDropHandle;
 use tonic::{Code, Status};
@@ -18,7 +17,7 @@ use super::reader::{BoundSeat, Contested, DETACHED_KEPT, Reader};
 use super::remote::NotPassedOn;
 use super::waiting::WaitingCommand;
 use crate::grpc::lookup::Lookup;
-use crate::grpc::status::{is_elsewhere, owner_unreachable, status, ticket_unknown};
+use crate::grpc::status::{invalid, is_elsewhere, owner_unreachable, status, ticket_unknown};
 use crate::grpc::takeover::{is_changing, waits};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Payer;
@@ -54,8 +53,9 @@ impl Reader {
             return self.refuse(handle, request_id, &too_many_seats());
         }
         if attach.entropy.len() > MAX_ENTROPY {
-            let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
-            return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
+            let problem = format!("at most {MAX_ENTROPY} bytes");
+            let refusal = invalid("ENTROPY_REFUSED", "entropy", problem);
+            return self.refuse(handle, request_id, &refusal);
         }
         let Some(token) = UnitToken::parse(&attach.ticket) else {
             return self.refuse(handle, request_id, &ticket_unknown());

@@ -7,55 +7,30 @@ use futures::{FutureExt as _, StreamExt as _};
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
-use super::reader::{Reader, Requests as _};
-use super::waiting::WaitingMemory;
-use chefshat_admission::access::Caller;
+use super::reader::Requests as _;
+use super::testing::{Node, Stream, attachment};
 use chefshat_admission::limits::Key;
 use chefshat_hosting::config::ServerConfig;
-use chefshat_hosting::room::{JoinRequest, Joined, Loss};
-use chefshat_hosting::rooms::{NewRoom, Rooms};
-use chefshat_hosting::tournaments::{Call, Entry, Tournaments};
+use chefshat_hosting::room::Loss;
+use chefshat_hosting::rooms::Rooms;
+use chefshat_hosting::tournaments::{Call, Entry};
 use chefshat_room::ids::{RoomToken, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_store::MemoryStore;
 use chefshat_wire::convert;
 use chefshat_wire::encoded::Received;
 use chefshat_wire::encoded::peer::{PlayInput, PlayRequest, play_input::Input};
-use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
+use chefshat_wire::outbox::StreamEnd;
 
-struct Server {
-    rooms: Arc<Rooms>,
-    tournaments: Arc<Tournaments>,
-}
-
-/// A stream of a client.
-struct Stream {
-    reader: Reader,
-    updates: OutboxStream,
-}
-
-impl Server {
-    fn start() -> Self {
+impl Node {
+    /// A server without peers.
+    fn single() -> Self {
         let store = Arc::new(MemoryStore::default());
-        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
-        let rooms = rooms.expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
-        Self { rooms, tournaments }
-    }
-
-    /// A stream of a client that is connected here.
-    fn stream(&self) -> Stream {
-        let (outbox, updates) = Outbox::new();
-        let caller = Caller::default();
-        let reader = Reader::new(
-            &self.rooms,
-            &self.tournaments,
-            WaitingMemory::for_tests(),
-            caller,
-            &outbox,
-            true,
-        );
-        Stream { reader, updates }
+        Self::of(Rooms::new(
+            &ServerConfig::default(),
+            store,
+            TaskTracker::new(),
+        ))
     }
 
     /// A stream of a client that is connected to another node.
@@ -63,15 +38,6 @@ impl Server {
         let Stream { reader, updates } = self.stream();
         let reader = reader.by_gateway();
         Stream { reader, updates }
-    }
-
-    /// The ticket of a seat in a room that waits for others.
-    async fn seat(&self) -> v1::Attach {
-        let created = self.rooms.create(NewRoom::for_tests());
-        let room = created.await.expect("a room").handle;
-        let joined = room.join(JoinRequest::for_tests("Ada"));
-        let Joined { ticket, .. } = joined.await.expect("a free seat");
-        attachment(&ticket.to_text())
     }
 
     /// The ticket of a participant of a tournament that has not started.
@@ -94,14 +60,7 @@ impl Server {
         };
         let joined = tournament.join(entry).await;
         let (_participant, ticket) = joined.expect("it is open");
-        attachment(&ticket.to_text())
-    }
-}
-
-fn attachment(ticket: &str) -> v1::Attach {
-    v1::Attach {
-        ticket: ticket.to_owned(),
-        ..v1::Attach::default()
+        attachment(&ticket)
     }
 }
 
@@ -125,10 +84,10 @@ impl Stream {
             handle,
             command: Some(command),
         };
-        self.read(Input::Command(command)).await;
+        self.read_input(Input::Command(command)).await;
     }
 
-    async fn read(&mut self, input: Input) {
+    async fn read_input(&mut self, input: Input) {
         let request = PlayRequest {
             inputs: vec![PlayInput {
                 input: Some(input),
@@ -145,7 +104,7 @@ impl Stream {
 
 #[tokio::test]
 async fn a_stream_whose_client_has_gone_attaches_nothing() {
-    let server = Server::start();
+    let server = Node::single();
     for attach in [server.participant().await, server.seat().await] {
         let mut newer = server.stream();
         newer.reader.attach(attach.clone()).await;
@@ -160,7 +119,7 @@ async fn a_stream_whose_client_has_gone_attaches_nothing() {
 
 #[tokio::test]
 async fn a_late_attachment_through_another_node_takes_no_seat_from_a_newer_stream() {
-    let server = Server::start();
+    let server = Node::single();
     let attach = server.seat().await;
     let mut newer = server.stream();
     newer.reader.attach(attach.clone()).await;
@@ -182,10 +141,10 @@ async fn a_late_attachment_through_another_node_takes_no_seat_from_a_newer_strea
     let mut newest = server.stream();
     newest.reader.attach(attach.clone()).await;
     assert!(newer.reader.seats[&0].is_detached());
-    next.read(Input::StillOpen(5)).await;
+    next.read_input(Input::StillOpen(5)).await;
     assert_eq!(next.questions(), [5], "about the newest stream");
     assert!(!newest.reader.seats[&0].is_detached());
-    next.read(Input::StillOpen(5)).await;
+    next.read_input(Input::StillOpen(5)).await;
     assert!(newest.reader.seats[&0].is_detached());
     assert!(
         !next.reader.has_attached(),
@@ -195,7 +154,7 @@ async fn a_late_attachment_through_another_node_takes_no_seat_from_a_newer_strea
 
 #[tokio::test]
 async fn a_gateway_that_answers_no_questions_is_asked_none() {
-    let server = Server::start();
+    let server = Node::single();
     let attach = server.seat().await;
     let mut lost = server.stream();
     lost.reader.attach(attach.clone()).await;
@@ -220,7 +179,7 @@ async fn a_gateway_that_answers_no_questions_is_asked_none() {
 
 #[tokio::test]
 async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_another_stream() {
-    let server = Server::start();
+    let server = Node::single();
     let attach = server.seat().await;
     let mut lost = server.stream();
     lost.reader.attach(attach.clone()).await;
@@ -230,7 +189,7 @@ async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_anoth
     // As a node does whose lease has ended. It, or another one, resumes the room later.
     let ticket = RoomToken::parse(&attach.ticket).expect("a ticket");
     server.rooms.stop_unit(ticket.subject.unit()).await;
-    next.read(Input::StillOpen(3)).await;
+    next.read_input(Input::StillOpen(3)).await;
     // An agent gives up a seat that is refused, and its game would wait for it.
     let end = next.updates.next().now_or_never().flatten();
     assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));
@@ -238,7 +197,7 @@ async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_anoth
 
 #[tokio::test]
 async fn a_late_attachment_through_another_node_takes_no_participant_from_a_newer_stream() {
-    let server = Server::start();
+    let server = Node::single();
     let attach = server.participant().await;
     let mut newer = server.stream_by_gateway();
     newer.receive(0, Command::Attach(attach.clone())).await;
@@ -250,14 +209,14 @@ async fn a_late_attachment_through_another_node_takes_no_participant_from_a_newe
     assert_eq!(late.questions(), [0]);
     assert!(newer.called().now_or_never().is_none());
 
-    late.read(Input::StillOpen(0)).await;
+    late.read_input(Input::StillOpen(0)).await;
     assert_eq!(newer.called().await, (0, Call::Superseded));
 }
 
 #[tokio::test]
 async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_on_another_stream()
 {
-    let server = Server::start();
+    let server = Node::single();
     let attach = server.participant().await;
     let mut lost = server.stream();
     lost.reader.attach(attach.clone()).await;
@@ -268,14 +227,14 @@ async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_
     assert_eq!(next.questions(), [3]);
     let ticket = TournamentToken::parse(&attach.ticket).expect("a ticket");
     server.tournaments.stop_one(ticket.subject.unit()).await;
-    next.read(Input::StillOpen(3)).await;
+    next.read_input(Input::StillOpen(3)).await;
     let end = next.updates.next().now_or_never().flatten();
     assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));
 }
 
 #[tokio::test]
 async fn only_a_gateway_that_announces_it_and_has_not_said_it_is_lost_with_its_stream() {
-    let server = Server::start();
+    let server = Node::single();
     for (announces_left, left, loss) in [
         // An older version.
         (false, false, Loss::Gone),

@@ -13,22 +13,18 @@ use tokio::time::{Duration, Instant};
 use tokio_util::task::TaskTracker;
 
 use super::parked::search;
-use super::reader::Reader;
-use super::waiting::WaitingMemory;
+use super::testing::{Node, Stream, attachment};
 use crate::grpc::forward::ForwardLayer;
 use crate::grpc::status::{owner_unreachable, ticket_unknown};
 use crate::peers::PeerPort;
-use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{CallLimits, Key, Shares};
 use chefshat_hosting::cluster::{Directory, FoundBy, Location, NodeLease, Peer};
 use chefshat_hosting::config::ServerConfig;
-use chefshat_hosting::room::{JoinRequest, Joined};
-use chefshat_hosting::rooms::{NewRoom, Rooms};
-use chefshat_hosting::tournaments::Tournaments;
+use chefshat_hosting::rooms::Rooms;
 use chefshat_room::ids::{RoomId, RoomToken, Token, TournamentId, UnitId, UnitToken};
 use chefshat_room::journal::{Change, Entry, ParticipantKind, SeatedParticipant};
 use chefshat_store::{MemoryStore, ResumableGame};
-use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
+use chefshat_wire::outbox::StreamEnd;
 
 /// Says the same about everything that this node does not have, until the test changes it.
 struct Says {
@@ -73,17 +69,6 @@ impl Directory for Says {
     }
 }
 
-struct Node {
-    rooms: Arc<Rooms>,
-    tournaments: Arc<Tournaments>,
-}
-
-/// A stream of a client.
-struct Stream {
-    reader: Reader,
-    updates: OutboxStream,
-}
-
 impl Node {
     fn start(directory: &Arc<Says>) -> Self {
         let lease = Arc::new(NodeLease::new());
@@ -92,10 +77,13 @@ impl Node {
         let config = ServerConfig::default();
         let (store, directory) = (Arc::new(MemoryStore::default()), Arc::clone(directory));
         let tracker = TaskTracker::new();
-        let rooms = Rooms::of_node(&config, store, directory, Some(lease), tracker.clone());
-        let rooms = rooms.expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker);
-        Self { rooms, tournaments }
+        Self::of(Rooms::of_node(
+            &config,
+            store,
+            directory,
+            Some(lease),
+            tracker,
+        ))
     }
 
     /// Resumes the room of a seat that another node had.
@@ -126,36 +114,6 @@ impl Node {
             concluded: false,
         };
         assert_eq!(self.rooms.resume_all(vec![game]).await, 1);
-    }
-
-    fn stream(&self) -> Stream {
-        let (outbox, updates) = Outbox::new();
-        let caller = Caller::default();
-        let reader = Reader::new(
-            &self.rooms,
-            &self.tournaments,
-            WaitingMemory::for_tests(),
-            caller,
-            &outbox,
-            true,
-        );
-        Stream { reader, updates }
-    }
-
-    /// The ticket of a seat in a new room.
-    async fn seat(&self) -> v1::Attach {
-        let created = self.rooms.create(NewRoom::for_tests());
-        let room = created.await.expect("a room").handle;
-        let joined = room.join(JoinRequest::for_tests("Ada"));
-        let Joined { ticket, .. } = joined.await.expect("a free seat");
-        attachment(&ticket)
-    }
-}
-
-fn attachment<T>(ticket: &Token<T>) -> v1::Attach {
-    v1::Attach {
-        ticket: ticket.to_text(),
-        ..v1::Attach::default()
     }
 }
 
@@ -302,7 +260,8 @@ async fn stream_of_gateway(node: &Node, directory: &Arc<Says>) -> Stream {
         .peers(&Arc::default());
     let limits = Arc::new(CallLimits::new(Shares::default()));
     let known: Arc<dyn Directory> = Arc::clone(directory) as _;
-    let gateway = ForwardLayer::new(known, peers, limits).gateway(&http::Request::new(()));
+    let layer = ForwardLayer::new(known, peers, limits).0;
+    let gateway = layer.gateway(&http::Request::new(()));
     let Stream { reader, updates } = node.stream();
     let reader = reader.with_remote(Some(gateway));
     Stream { reader, updates }

@@ -8,7 +8,6 @@ use std::sync::{Arc, OnceLock};
 use std::task::{Context, Poll};
 
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
-use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
@@ -20,7 +19,7 @@ use super::remote::{FIRST_ASSIGNED_HANDLE, NodeGone, RemoteSeats};
 use super::waiting::{WaitingCommand, WaitingMemory};
 use crate::grpc::forward::Gateway;
 use crate::grpc::refusals::count;
-use crate::grpc::status::{field, refused, room_gone, status};
+use crate::grpc::status::{command_missing, field, invalid, refused, room_gone, status};
 use chefshat_admission::access::Caller;
 use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING};
 use chefshat_hosting::room::{Handle, Loss, SeatAction};
@@ -346,15 +345,10 @@ impl Reader {
             Some(Command::Answer(answer)) => SeatAction::Answer(convert::answer_from_proto(answer)),
             Some(Command::Express(expression)) => match express_action(&expression) {
                 Ok(action) => action,
-                Err(problem) => {
-                    return self.refuse_field(handle, 0, "EXPRESSION_REFUSED", &problem);
-                }
+                Err(refusal) => return self.refuse(handle, 0, &refusal),
             },
             Some(Command::Resume(_)) => SeatAction::Resume,
-            None => {
-                let problem = FieldProblem::new("command", "set a command");
-                return self.refuse_field(handle, 0, "COMMAND_MISSING", &problem);
-            }
+            None => return self.refuse(handle, 0, &command_missing()),
         };
         self.perform(handle, action, arrived).await;
     }
@@ -362,11 +356,9 @@ impl Reader {
     /// Sends an action to the room of a seat and waits for space in its mailbox.
     pub(super) async fn perform(&mut self, handle: u32, action: SeatAction, arrived: Instant) {
         let Some(bound) = self.seats.get(&handle) else {
-            let problem = FieldProblem::new(
-                "handle",
-                "no seat of this stream has this handle; attach first",
-            );
-            return self.refuse_field(handle, 0, "HANDLE_UNKNOWN", &problem);
+            let problem = "no seat of this stream has this handle; attach first";
+            let refusal = invalid("HANDLE_UNKNOWN", "handle", problem);
+            return self.refuse(handle, 0, &refusal);
         };
         let (room, seat, connection) = (bound.room.clone(), bound.seat, bound.connection);
         if room
@@ -427,16 +419,6 @@ impl Reader {
         }
     }
 
-    pub(super) fn refuse_field(
-        &self,
-        handle: u32,
-        request_id: u32,
-        reason: &str,
-        problem: &FieldProblem,
-    ) {
-        self.refuse(handle, request_id, &field(reason, problem));
-    }
-
     pub(super) fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
         count(self.rooms.metrics(), refusal);
         self.send_update(handle, Update::Refused(refused(request_id, refusal)));
@@ -479,13 +461,15 @@ fn silent() -> Status {
 ///
 /// # Errors
 /// A field is out of its range.
-pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {
+pub(super) fn express_action(expression: &v1::Expression) -> Result<SeatAction, Status> {
     if expression.source() == v1::ExpressionSource::Wizard {
         // It would betray the seat.
         let problem = "the server sets WIZARD in records; send what a robot would";
-        return Err(FieldProblem::new("source", problem));
+        return Err(invalid("EXPRESSION_REFUSED", "source", problem));
     }
-    convert::expression_from_proto(expression).map(SeatAction::Express)
+    let expression = convert::expression_from_proto(expression);
+    let action = expression.map(SeatAction::Express);
+    action.map_err(|problem| field("EXPRESSION_REFUSED", &problem))
 }
 
 #[cfg(test)]

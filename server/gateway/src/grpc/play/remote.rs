@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::sync::{Arc, OnceLock};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -26,6 +26,7 @@ use tracing::debug;
 use super::parked::Parked;
 use super::waiting::WaitingMemory;
 use chefshat_base::clock::ProcessClock;
+use chefshat_base::lock::Lock;
 use chefshat_hosting::cluster::{Directory, Elsewhere, FoundBy, Peer};
 
 use crate::grpc::forward::Gateway;
@@ -81,9 +82,9 @@ struct PeerStream {
 /// What the reader of the client's stream and the receiver of a peer stream share.
 #[derive(Default)]
 struct Shared {
-    seats: Mutex<BTreeMap<u32, RemoteSeat>>,
+    seats: Lock<BTreeMap<u32, RemoteSeat>>,
     /// What the client attached there and lost because the node stops.
-    stopped: Mutex<BTreeSet<UnitId>>,
+    stopped: Lock<BTreeSet<UnitId>>,
     /// Whether the stream has ended and its attachments were given back. Changes while `seats` are
     /// locked.
     is_over: AtomicBool,
@@ -92,24 +93,16 @@ struct Shared {
 }
 
 impl Shared {
-    fn seats(&self) -> MutexGuard<'_, BTreeMap<u32, RemoteSeat>> {
-        (self.seats.lock()).expect("nothing panics under this lock")
-    }
-
-    fn stopped(&self) -> MutexGuard<'_, BTreeSet<UnitId>> {
-        (self.stopped.lock()).expect("nothing panics under this lock")
-    }
-
     /// The rooms and tournaments that the client has there, those included that the node stops.
     fn ids(&self) -> BTreeSet<UnitId> {
-        let mut ids = self.stopped().clone();
-        ids.extend(self.seats().values().filter_map(|seat| seat.id));
+        let mut ids = self.stopped.lock().clone();
+        ids.extend(self.seats.lock().values().filter_map(|seat| seat.id));
         ids
     }
 
     /// Whether a seat is there, or on its way.
     fn has(&self, handle: u32) -> bool {
-        self.seats().contains_key(&handle)
+        self.seats.lock().contains_key(&handle)
     }
 
     fn is_over(&self) -> bool {
@@ -117,13 +110,13 @@ impl Shared {
     }
 
     fn has_attached(&self) -> bool {
-        self.seats().values().any(|seat| seat.is_attached)
+        self.seats.lock().values().any(|seat| seat.is_attached)
     }
 
     /// Ends the stream and returns its attachments, if none of them was successful: the client does
     /// not need to know that there was a stream.
     fn end_unattached(&self) -> Option<Vec<(u32, Box<Parked>)>> {
-        let mut seats = self.seats();
+        let mut seats = self.seats.lock();
         // A client whose seats were detached because the other node stops waits for the end.
         if seats.is_empty() || seats.values().any(|seat| seat.parked.is_none()) {
             return None;
@@ -204,7 +197,7 @@ impl RemoteSeats {
         let counts = self
             .streams
             .iter()
-            .map(|stream| stream.shared.seats().len());
+            .map(|stream| stream.shared.seats.lock().len());
         counts.sum()
     }
 
@@ -219,7 +212,7 @@ impl RemoteSeats {
     pub(super) fn has_before(&self, handle: u32, secret: &[u8; 32], to: Option<&Peer>) -> bool {
         let elsewhere = |it: &&PeerStream| to.is_none_or(|to| it.endpoint != to.endpoint);
         self.streams.iter().filter(elsewhere).any(|stream| {
-            let seats = stream.shared.seats();
+            let seats = stream.shared.seats.lock();
             let mut before = seats
                 .range(..handle)
                 .filter_map(|(_, seat)| seat.parked.as_ref());
@@ -264,7 +257,7 @@ impl RemoteSeats {
         };
         let parked = Box::new(parked);
         {
-            let mut seats = stream.shared.seats();
+            let mut seats = stream.shared.seats.lock();
             if stream.shared.is_over() {
                 return Err(NotPassedOn::NodeGone(parked));
             }
@@ -456,7 +449,7 @@ impl PeerStream {
 
     /// When the client's transport took the request for a decision, in time that the process has run.
     fn handed_over(&self, handle: u32, decision_id: u64) -> Option<Duration> {
-        let seats = self.shared.seats();
+        let seats = self.shared.seats.lock();
         let handover = seats.get(&handle)?.decision.as_ref()?;
         (handover.decision_id == decision_id)
             .then(|| handover.at.get().copied())
@@ -537,7 +530,7 @@ impl Receiver {
 
     /// Notes what an update says about its seat.
     fn follow(&self, handle: u32, update: Received) -> Option<Arc<Handover>> {
-        let mut seats = self.shared.seats();
+        let mut seats = self.shared.seats.lock();
         match update {
             Received::Attached => {
                 let seat = seats.entry(handle).or_default();
@@ -547,7 +540,7 @@ impl Receiver {
                 let detached = seats.remove(&handle);
                 // Those of games that are over are of no interest any more.
                 if let Some(id) = detached.and_then(|seat| seat.id).filter(|_| stops) {
-                    self.shared.stopped().insert(id);
+                    self.shared.stopped.lock().insert(id);
                 }
             }
             // Of its attachment, or of another command.
@@ -620,7 +613,7 @@ mod tests {
                 id: room(number),
                 ..RemoteSeat::default()
             };
-            receiver.shared.seats().insert(number, seat);
+            receiver.shared.seats.lock().insert(number, seat);
             let end = match number % 3 {
                 0 => Received::Refused,
                 _ => {
@@ -640,11 +633,11 @@ mod tests {
                 id,
                 ..RemoteSeat::default()
             };
-            receiver.shared.seats().insert(number, seat);
+            receiver.shared.seats.lock().insert(number, seat);
             receiver.follow(number, Received::Attached);
             end.map(|end| receiver.follow(number, end));
         }
-        assert_eq!(receiver.shared.seats().len(), 1);
+        assert_eq!(receiver.shared.seats.lock().len(), 1);
         assert_eq!(
             receiver.shared.ids(),
             [1, 2].into_iter().filter_map(room).collect()
@@ -658,13 +651,13 @@ mod tests {
             parked: Some(Box::new(Parked::new(v1::Attach::default()))),
             ..RemoteSeat::default()
         };
-        receiver.shared.seats().insert(3, parked());
+        receiver.shared.seats.lock().insert(3, parked());
         receiver.follow(3, Received::Attached);
         assert!(receiver.shared.end_unattached().is_none());
         receiver.follow(3, Received::Detached { stops: true });
         assert!(receiver.shared.end_unattached().is_none());
 
-        receiver.shared.seats().insert(4, parked());
+        receiver.shared.seats.lock().insert(4, parked());
         let given_back = receiver
             .shared
             .end_unattached()

@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
-use chefshat_record::convert::FieldProblem;
 use chefshat_study::{
     At, ItemAnswer, Joined, ParticipantLink, Pointer, Refusal as StudyRefusal, RequiredDevice,
     SessionSecret,
@@ -16,7 +15,7 @@ use tonic::{Code, Request, Response, Status};
 use super::{StudyCalls, code_of, not_done, refused};
 use crate::grpc::follow::{self, Responses, Sender, changed};
 use crate::grpc::limits::charged;
-use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
+use crate::grpc::status::{Refusal, invalid, link_unknown, shutting_down, status, store_failed};
 use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StreamKind;
@@ -101,15 +100,6 @@ impl StudyCalls {
     }
 }
 
-fn link_unknown() -> Status {
-    status(
-        Code::Unauthenticated,
-        "LINK_UNKNOWN",
-        "this is not a link of a study on this server; check that it is complete",
-        [("field", "link")],
-    )
-}
-
 /// The status for somebody with this id at the panel who may not begin: it names where the page sends
 /// them, or the device that is needed.
 fn not_admitted(handle: &StudyHandle, panel_id: &str, problem: NotDone) -> Status {
@@ -180,10 +170,7 @@ impl ParticipationService for StudyCalls {
         }
         let request_id = <[u8; 32]>::try_from(request.request_id).map_err(|bytes| {
             let problem = format!("{} bytes; give 32 random ones", bytes.len());
-            field(
-                "REQUEST_ID_REFUSED",
-                &FieldProblem::new("request_id", problem),
-            )
+            invalid("REQUEST_ID_REFUSED", "request_id", problem)
         })?;
         let panel_id = request.panel_id;
         let joined = Joined {
@@ -408,7 +395,7 @@ fn traces_refused(refusal: TraceRefusal) -> Status {
         TraceRefusal::GameUnknown => (Code::NotFound, "GAME_UNKNOWN"),
         TraceRefusal::TooMany => (Code::ResourceExhausted, "TOO_MANY_TRACES"),
         TraceRefusal::Invalid(problem) => {
-            return field("TRACES_REFUSED", &FieldProblem::new("traces", problem));
+            return invalid("TRACES_REFUSED", "traces", problem);
         }
         TraceRefusal::Session(refusal) => return refused(refusal),
         TraceRefusal::Store(error) => {

@@ -10,7 +10,7 @@ use chefshat_study::{
 
 use super::table::{Code, Column, Kind, Sheet, Table};
 use chefshat_room::ids::GameId;
-use chefshat_wire::convert;
+use chefshat_wire::convert::{self, Mirrored as _};
 
 /// A time of day.
 pub(super) const SINCE_EPOCH: Kind = Kind::Integer("milliseconds since 1970-01-01 00:00 UTC");
@@ -334,7 +334,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
 }
 
 fn state_name(status: Status) -> String {
-    let name = convert::participant_state(status).as_str_name();
+    let name = status.to_proto().as_str_name();
     code_of(name, "STUDY_PARTICIPANT_STATE_")
 }
 

@@ -159,16 +159,6 @@ impl StudyHandle {
         study
     }
 
-    /// Sends the pictures of the study.
-    async fn pictures(&self, sender: &mpsc::Sender<ExportedFile>) -> Result<(), ExportError> {
-        for picture in &self.header.settings.pictures {
-            let mut file = File::new(format!("pictures/{}", picture.name), sender);
-            file.bytes(&picture.data).await?;
-            file.end().await?;
-        }
-        Ok(())
-    }
-
     /// Sends the data of the study, or those of its test participants, file by file.
     ///
     /// # Errors
@@ -182,104 +172,294 @@ impl StudyHandle {
         let study = &self.committed().clone();
         let people = study.participants().iter();
         let people = people.filter(|(_, it)| it.test == test);
-        let people: Vec<_> = people.map(|(number, it)| (*number, it)).collect();
-        json_file("study.json", &self.publishable(), sender).await?;
-        self.pictures(sender).await?;
-        let mut sheets = vec![participants(study, &people, sender).await?];
-        sheets.push(sessions(study, &people, sender).await?);
+        let export = Export {
+            handle: self,
+            study,
+            people: people.map(|(number, it)| (*number, it)).collect(),
+            rooms,
+            sender,
+        };
+        export.json_file("study.json", &self.publishable()).await?;
+        export.pictures().await?;
+        let mut sheets = vec![export.participants().await?];
+        sheets.push(export.sessions().await?);
         if study.settings().groups.is_some() {
-            sheets.push(groups(study, &people, sender).await?);
+            sheets.push(export.groups().await?);
         }
-        sheets.extend(games(self, study, &people, rooms, sender).await?);
-        sheets.push(items(study, sender).await?);
-        sheets.push(answers(study, &people, sender).await?);
-        sheets.push(traces(self, study, &people, rooms, sender).await?);
-        sheets.push(codebook(&sheets, sender).await?);
+        sheets.extend(export.games().await?);
+        sheets.push(export.items().await?);
+        sheets.push(export.answers().await?);
+        sheets.push(export.traces().await?);
+        sheets.push(export.codebook(&sheets).await?);
         let name = format!("study-{}", self.id());
         let descriptor = table::descriptor(&name, &self.plan.name, &sheets);
-        json_file("datapackage.json", &descriptor, sender).await
+        export.json_file("datapackage.json", &descriptor).await
     }
 }
 
-/// Sends a value as a file.
-async fn json_file(
-    name: &str,
-    value: &impl Serialize,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<(), ExportError> {
-    let json = serde_json::to_string_pretty(value);
-    let json = json.map_err(|error| StoreError::Failed(error.to_string()))?;
-    let mut file = File::new(name, sender);
-    file.line(&json).await?;
-    file.end().await
+/// What is exported, and to whom it is sent.
+struct Export<'s> {
+    handle: &'s StudyHandle,
+    study: &'s Study,
+    /// The participants whose data are exported, by number.
+    people: Vec<(u32, &'s Participant)>,
+    rooms: &'s Rooms,
+    sender: &'s mpsc::Sender<ExportedFile>,
 }
 
-/// The participants whose data are exported, by number.
-type People<'s> = [(u32, &'s Participant)];
-
-async fn participants(
-    study: &Study,
-    people: &People<'_>,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let mut file = TableFile::new(columns::participants(study.settings()), sender).await?;
-    for &(number, participant) in people {
-        let row = ParticipantRow {
-            study,
-            number,
-            participant,
-        };
-        file.row(&row).await?;
-    }
-    file.end().await
-}
-
-async fn sessions(
-    study: &Study,
-    people: &People<'_>,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let mut file = TableFile::new(columns::sessions(), sender).await?;
-    let asks = study.settings().asks_for_consent();
-    for &(number, participant) in people {
-        if asks && participant.consent.is_none() {
-            continue;
+impl Export<'_> {
+    /// Sends the pictures of the study.
+    async fn pictures(&self) -> Result<(), ExportError> {
+        for picture in &self.handle.header.settings.pictures {
+            let mut file = File::new(format!("pictures/{}", picture.name), self.sender);
+            file.bytes(&picture.data).await?;
+            file.end().await?;
         }
-        for (session, opened) in &participant.devices {
-            let row = SessionRow {
+        Ok(())
+    }
+
+    /// Sends a value as a file.
+    async fn json_file(&self, name: &str, value: &impl Serialize) -> Result<(), ExportError> {
+        let json = serde_json::to_string_pretty(value);
+        let json = json.map_err(|error| StoreError::Failed(error.to_string()))?;
+        let mut file = File::new(name, self.sender);
+        file.line(&json).await?;
+        file.end().await
+    }
+
+    async fn participants(&self) -> Result<Sheet, ExportError> {
+        let study = self.study;
+        let mut file = TableFile::new(columns::participants(study.settings()), self.sender).await?;
+        for &(number, participant) in &self.people {
+            let row = ParticipantRow {
+                study,
                 number,
                 participant,
-                session: *session,
-                opened,
             };
             file.row(&row).await?;
         }
+        file.end().await
     }
-    file.end().await
-}
 
-/// Sends the groups, in the order in which they were formed.
-async fn groups(
-    study: &Study,
-    people: &People<'_>,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let mut groups: BTreeMap<u32, Vec<(u32, &Participant)>> = BTreeMap::new();
-    for &(number, participant) in people {
-        if let Some(group) = participant.group {
-            groups.entry(group).or_default().push((number, participant));
+    async fn sessions(&self) -> Result<Sheet, ExportError> {
+        let mut file = TableFile::new(columns::sessions(), self.sender).await?;
+        let asks = self.study.settings().asks_for_consent();
+        for &(number, participant) in &self.people {
+            if asks && participant.consent.is_none() {
+                continue;
+            }
+            for (session, opened) in &participant.devices {
+                let row = SessionRow {
+                    number,
+                    participant,
+                    session: *session,
+                    opened,
+                };
+                file.row(&row).await?;
+            }
         }
+        file.end().await
     }
-    let mut file = TableFile::new(columns::groups(study.settings()), sender).await?;
-    for (group, members) in groups {
-        let row = GroupRow {
-            study,
-            group,
-            members,
-        };
-        file.row(&row).await?;
+
+    /// Sends the groups, in the order in which they were formed.
+    async fn groups(&self) -> Result<Sheet, ExportError> {
+        let study = self.study;
+        let mut groups: BTreeMap<u32, Vec<(u32, &Participant)>> = BTreeMap::new();
+        for &(number, participant) in &self.people {
+            if let Some(group) = participant.group {
+                groups.entry(group).or_default().push((number, participant));
+            }
+        }
+        let mut file = TableFile::new(columns::groups(study.settings()), self.sender).await?;
+        for (group, members) in groups {
+            let row = GroupRow {
+                study,
+                group,
+                members,
+            };
+            file.row(&row).await?;
+        }
+        file.end().await
     }
-    file.end().await
+
+    /// Sends the games, what cannot be read of them, and their records.
+    async fn games(&self) -> Result<Vec<Sheet>, ExportError> {
+        let study = self.study;
+        let settings = study.settings();
+        let mut file = TableFile::new(columns::games(settings), self.sender).await?;
+        let (mut records, mut unreadable) = (Vec::new(), BTreeMap::new());
+        // Those of a group have one game.
+        let mut exported = BTreeSet::new();
+        for &(number, participant) in &self.people {
+            for game in &participant.games {
+                if !is_in_data(study, participant, game) {
+                    continue;
+                }
+                let id = convert::game_of(&game.placed);
+                let lines = match record_of(self.handle, self.rooms, id).await {
+                    // One game that cannot be read ends no export of the others.
+                    Err(StoreError::Unreadable(problem)) => {
+                        error!(study = %self.handle.id(), %problem, "a game is left out of an export");
+                        unreadable.insert(id, problem);
+                        None
+                    }
+                    lines => lines?,
+                };
+                let result = lines.as_ref();
+                let row = GameRow {
+                    study,
+                    name: &self.handle.plan.name,
+                    number,
+                    participant,
+                    game,
+                    result: result.map(|lines| GameResult::of(lines, game.placed.seat)),
+                };
+                file.row(&row).await?;
+                if lines.is_some() && exported.insert(id) {
+                    records.push(id);
+                }
+            }
+        }
+        let mut sheets = vec![file.end().await?];
+        for game in records {
+            let lines = match record_of(self.handle, self.rooms, game).await {
+                // It could be read a moment ago.
+                Err(StoreError::Unreadable(_)) => None,
+                lines => lines?,
+            };
+            let Some(lines) = lines else {
+                continue;
+            };
+            let mut file = File::new(format!("records/{game}.jsonl"), self.sender);
+            for line in &lines {
+                let json = serde_json::to_string(line)
+                    .map_err(|error| StoreError::Failed(error.to_string()))?;
+                file.line(&json).await?;
+            }
+            file.end().await?;
+            let problem = samples(self.rooms, game, self.sender).await?;
+            unreadable.extend(problem.map(|problem| (game, problem)));
+        }
+        if !unreadable.is_empty() {
+            let mut file = TableFile::new(columns::unreadable(), self.sender).await?;
+            for row in unreadable {
+                file.row(&row).await?;
+            }
+            sheets.push(file.end().await?);
+        }
+        Ok(sheets)
+    }
+
+    /// Sends the items of all questionnaires.
+    async fn items(&self) -> Result<Sheet, ExportError> {
+        let mut file = TableFile::new(questionnaires::items(), self.sender).await?;
+        for part in self.study.settings().stages.iter().flat_map(Stage::parts) {
+            let Task::Questionnaire(questionnaire) = &part.task else {
+                continue;
+            };
+            for (index, item) in questionnaire.items.iter().enumerate() {
+                let row = ItemRow {
+                    questionnaire,
+                    index,
+                    item,
+                };
+                file.row(&row).await?;
+            }
+        }
+        file.end().await
+    }
+
+    /// Sends the items of the questionnaires that participants have reached, with their answers.
+    async fn answers(&self) -> Result<Sheet, ExportError> {
+        let study = self.study;
+        let settings = study.settings();
+        let mut file = TableFile::new(questionnaires::answers(settings), self.sender).await?;
+        for &(number, participant) in &self.people {
+            if participant.data_deleted {
+                continue;
+            }
+            let sequence = study.sequence_of(participant).unwrap_or_default();
+            let steps = settings.steps(sequence).into_iter().enumerate();
+            for (step, at) in steps.take(participant.reached_at_ms.len()) {
+                let Task::Questionnaire(questionnaire) = at.task else {
+                    continue;
+                };
+                let condition = at
+                    .block
+                    .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
+                let answers = participant.answers.get(&step);
+                let answers = answers.map_or(&[][..], |answers| answers);
+                let shown = study.shown_items(number, step).unwrap_or_default();
+                for (index, item) in questionnaire.items.iter().enumerate() {
+                    let position = shown.iter().position(|it| *it == index);
+                    let row = AnswerRow {
+                        number,
+                        participant,
+                        step,
+                        condition: condition.map(|index| &settings.conditions[index]),
+                        questionnaire,
+                        item,
+                        position: position.map(|position| position + 1),
+                        answer: answers.iter().find(|answer| answer.item == index),
+                    };
+                    file.row(&row).await?;
+                }
+            }
+        }
+        file.end().await
+    }
+
+    async fn traces(&self) -> Result<Sheet, ExportError> {
+        let study = self.study;
+        let settings = study.settings();
+        let mut conditions = BTreeMap::new();
+        for &(number, participant) in &self.people {
+            for game in &participant.games {
+                if is_in_data(study, participant, game) {
+                    conditions.insert(
+                        (number, convert::game_of(&game.placed)),
+                        game.placed.condition,
+                    );
+                }
+            }
+        }
+        let traces = self.rooms.store().traces(self.handle.id()).await?;
+        let mut file = TableFile::new(columns::traces(settings), self.sender).await?;
+        let mut earlier: BTreeMap<(u32, GameId), &[v1::StudyTrace]> = BTreeMap::new();
+        for stored in &traces {
+            let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
+                continue;
+            };
+            let participant = study.participant(stored.number);
+            // Traces whose receipt did not reach the device came again, before those that followed.
+            let of = (stored.number, stored.game);
+            let before = earlier.insert(of, &stored.traces);
+            let new = before.and_then(|before| stored.traces.strip_prefix(before));
+            for trace in new.unwrap_or(&stored.traces) {
+                let row = TraceRow {
+                    number: stored.number,
+                    session: stored.session,
+                    pseudonym: participant.map_or("", |it| &it.pseudonym),
+                    condition: &settings.conditions[*condition],
+                    game: stored.game,
+                    trace,
+                };
+                file.row(&row).await?;
+            }
+        }
+        file.end().await
+    }
+
+    /// Sends what the columns of these tables mean.
+    async fn codebook(&self, sheets: &[Sheet]) -> Result<Sheet, ExportError> {
+        let mut file = TableFile::new(columns::codebook(), self.sender).await?;
+        for sheet in sheets {
+            for index in 0..sheet.columns.len() {
+                file.row(&CodebookRow { sheet, index }).await?;
+            }
+        }
+        file.end().await
+    }
 }
 
 /// Whether exported data include a game.
@@ -293,79 +473,6 @@ fn is_in_data(study: &Study, participant: &Participant, game: &PlayedGame) -> bo
         steps.get(game.placed.step).map(|step| step.task),
         Some(Task::Practice { in_data: false })
     )
-}
-
-/// Sends the games, what cannot be read of them, and their records.
-async fn games(
-    handle: &StudyHandle,
-    study: &Study,
-    people: &People<'_>,
-    rooms: &Rooms,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Vec<Sheet>, ExportError> {
-    let settings = study.settings();
-    let mut file = TableFile::new(columns::games(settings), sender).await?;
-    let (mut records, mut unreadable) = (Vec::new(), BTreeMap::new());
-    // Those of a group have one game.
-    let mut exported = BTreeSet::new();
-    for &(number, participant) in people {
-        for game in &participant.games {
-            if !is_in_data(study, participant, game) {
-                continue;
-            }
-            let id = convert::game_of(&game.placed);
-            let lines = match record_of(handle, rooms, id).await {
-                // One game that cannot be read ends no export of the others.
-                Err(StoreError::Unreadable(problem)) => {
-                    error!(study = %handle.id(), %problem, "a game is left out of an export");
-                    unreadable.insert(id, problem);
-                    None
-                }
-                lines => lines?,
-            };
-            let result = lines.as_ref();
-            let row = GameRow {
-                study,
-                name: &handle.plan.name,
-                number,
-                participant,
-                game,
-                result: result.map(|lines| GameResult::of(lines, game.placed.seat)),
-            };
-            file.row(&row).await?;
-            if lines.is_some() && exported.insert(id) {
-                records.push(id);
-            }
-        }
-    }
-    let mut sheets = vec![file.end().await?];
-    for game in records {
-        let lines = match record_of(handle, rooms, game).await {
-            // It could be read a moment ago.
-            Err(StoreError::Unreadable(_)) => None,
-            lines => lines?,
-        };
-        let Some(lines) = lines else {
-            continue;
-        };
-        let mut file = File::new(format!("records/{game}.jsonl"), sender);
-        for line in &lines {
-            let json = serde_json::to_string(line)
-                .map_err(|error| StoreError::Failed(error.to_string()))?;
-            file.line(&json).await?;
-        }
-        file.end().await?;
-        let problem = samples(rooms, game, sender).await?;
-        unreadable.extend(problem.map(|problem| (game, problem)));
-    }
-    if !unreadable.is_empty() {
-        let mut file = TableFile::new(columns::unreadable(), sender).await?;
-        for row in unreadable {
-            file.row(&row).await?;
-        }
-        sheets.push(file.end().await?);
-    }
-    Ok(sheets)
 }
 
 /// The samples of a game's seats, in files that `chefshat export` finds beside the records. Returns why
@@ -433,126 +540,4 @@ pub(super) async fn record_of(
     let lines = reading.await;
     (lines.map(Some))
         .ok_or_else(|| StoreError::Unreadable(format!("the record of game {game} cannot be made")))
-}
-
-/// Sends the items of all questionnaires.
-async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
-    let mut file = TableFile::new(questionnaires::items(), sender).await?;
-    for part in study.settings().stages.iter().flat_map(Stage::parts) {
-        let Task::Questionnaire(questionnaire) = &part.task else {
-            continue;
-        };
-        for (index, item) in questionnaire.items.iter().enumerate() {
-            let row = ItemRow {
-                questionnaire,
-                index,
-                item,
-            };
-            file.row(&row).await?;
-        }
-    }
-    file.end().await
-}
-
-/// Sends the items of the questionnaires that participants have reached, with their answers.
-async fn answers(
-    study: &Study,
-    people: &People<'_>,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let settings = study.settings();
-    let mut file = TableFile::new(questionnaires::answers(settings), sender).await?;
-    for &(number, participant) in people {
-        if participant.data_deleted {
-            continue;
-        }
-        let sequence = study.sequence_of(participant).unwrap_or_default();
-        let steps = settings.steps(sequence).into_iter().enumerate();
-        for (step, at) in steps.take(participant.reached_at_ms.len()) {
-            let Task::Questionnaire(questionnaire) = at.task else {
-                continue;
-            };
-            let condition = at
-                .block
-                .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
-            let answers = participant.answers.get(&step);
-            let answers = answers.map_or(&[][..], |answers| answers);
-            let shown = study.shown_items(number, step).unwrap_or_default();
-            for (index, item) in questionnaire.items.iter().enumerate() {
-                let position = shown.iter().position(|it| *it == index);
-                let row = AnswerRow {
-                    number,
-                    participant,
-                    step,
-                    condition: condition.map(|index| &settings.conditions[index]),
-                    questionnaire,
-                    item,
-                    position: position.map(|position| position + 1),
-                    answer: answers.iter().find(|answer| answer.item == index),
-                };
-                file.row(&row).await?;
-            }
-        }
-    }
-    file.end().await
-}
-
-async fn traces(
-    handle: &StudyHandle,
-    study: &Study,
-    people: &People<'_>,
-    rooms: &Rooms,
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let settings = study.settings();
-    let mut conditions = BTreeMap::new();
-    for &(number, participant) in people {
-        for game in &participant.games {
-            if is_in_data(study, participant, game) {
-                conditions.insert(
-                    (number, convert::game_of(&game.placed)),
-                    game.placed.condition,
-                );
-            }
-        }
-    }
-    let traces = rooms.store().traces(handle.id()).await?;
-    let mut file = TableFile::new(columns::traces(settings), sender).await?;
-    let mut earlier: BTreeMap<(u32, GameId), &[v1::StudyTrace]> = BTreeMap::new();
-    for stored in &traces {
-        let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
-            continue;
-        };
-        let participant = study.participant(stored.number);
-        // Traces whose receipt did not reach the device came again, before those that followed.
-        let of = (stored.number, stored.game);
-        let before = earlier.insert(of, &stored.traces);
-        let new = before.and_then(|before| stored.traces.strip_prefix(before));
-        for trace in new.unwrap_or(&stored.traces) {
-            let row = TraceRow {
-                number: stored.number,
-                session: stored.session,
-                pseudonym: participant.map_or("", |it| &it.pseudonym),
-                condition: &settings.conditions[*condition],
-                game: stored.game,
-                trace,
-            };
-            file.row(&row).await?;
-        }
-    }
-    file.end().await
-}
-
-/// Sends what the columns of these tables mean.
-async fn codebook(
-    sheets: &[Sheet],
-    sender: &mpsc::Sender<ExportedFile>,
-) -> Result<Sheet, ExportError> {
-    let mut file = TableFile::new(columns::codebook(), sender).await?;
-    for sheet in sheets {
-        for index in 0..sheet.columns.len() {
-            file.row(&CodebookRow { sheet, index }).await?;
-        }
-    }
-    file.end().await
 }
