@@ -3,7 +3,7 @@
 
 pub mod real_table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -28,6 +28,47 @@ pub fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
+/// The id with this number.
+pub const fn id<T>(number: u8) -> Id<T> {
+    Id::from_bytes([number; 16])
+}
+
+/// The header of a game with a known seed.
+pub fn header(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> GameHeader {
+    GameHeader {
+        room_id: id(1),
+        game_id: id(2),
+        name: "table".into(),
+        rules: rules.validate().expect("a valid rule set"),
+        rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
+        participant_removed: false,
+        policy,
+        display_names: BTreeMap::new(),
+        wizards: BTreeSet::new(),
+        recorded: BTreeMap::new(),
+        start: GameStart::default(),
+        fills,
+        seed: SeedPlan::Fixed { game_seed: [7; 32] },
+        created_at_ms: 0,
+        join_code: "CODE".into(),
+        owner: SecretHash::of(b"owner"),
+        tournament: None,
+        table: None,
+        study: None,
+    }
+}
+
+/// A participant without a key.
+pub fn participant(name: &str, kind: ParticipantKind) -> SeatedParticipant {
+    SeatedParticipant {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind,
+        ticket: SecretHash::of(b"ticket"),
+    }
+}
+
 /// A room under test: the core, a clock, and the journal of committed changes.
 pub struct Table {
     pub core: Core,
@@ -45,30 +86,8 @@ impl Table {
     }
 
     pub fn with_rules(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> Self {
-        let header = Arc::new(GameHeader {
-            room_id: Id::from_bytes([1; 16]),
-            game_id: Id::from_bytes([2; 16]),
-            name: "table".into(),
-            rules: rules.validate().expect("a valid rule set"),
-            rules_version: RULES_VERSION,
-            server_version: String::new(),
-            participant_removed: false,
-            policy,
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            fills,
-            seed: SeedPlan::Fixed { game_seed: [7; 32] },
-            created_at_ms: 0,
-            join_code: "CODE".into(),
-            owner: SecretHash::of(b"owner"),
-            tournament: None,
-            table: None,
-            study: None,
-        });
         Self {
-            core: Core::new(header),
+            core: Core::new(Arc::new(header(policy, fills, rules))),
             now: Duration::ZERO,
             journal: Vec::new(),
             connections: 0,
@@ -84,15 +103,8 @@ impl Table {
         table.core = Core::new(Arc::new(header));
         for seat in table.core.all_seats() {
             if let Fill::AtTable(kind) = table.core.standing(seat).fill {
-                table.core.seat(
-                    seat,
-                    SeatedParticipant {
-                        name: format!("player {seat}"),
-                        name_fingerprint: String::new(),
-                        kind,
-                        ticket: SecretHash::of(b"nobody"),
-                    },
-                );
+                let player = participant(&format!("player {seat}"), kind);
+                table.core.seat(seat, player);
             }
         }
         table.core.begin_if_all_built_in(table.now);
@@ -145,16 +157,7 @@ impl Table {
     }
 
     pub fn join(&mut self, kind: ParticipantKind) -> Result<Seat, JoinError> {
-        let joined = self.core.join(
-            self.now,
-            None,
-            SeatedParticipant {
-                name: "somebody".into(),
-                name_fingerprint: String::new(),
-                kind,
-                ticket: SecretHash::of(b"ticket"),
-            },
-        );
+        let joined = (self.core).join(self.now, None, participant("somebody", kind));
         self.commit();
         joined
     }
@@ -322,7 +325,7 @@ pub fn with_jokers_at(
 /// The game of a study whose participant has seat 0.
 pub fn study_game(labels: SeatLabels) -> StudyGame {
     StudyGame {
-        study: Id::from_bytes([9; 16]),
+        study: id(9),
         name: "study".into(),
         condition: "condition".into(),
         levels: [("factor".to_owned(), "level".to_owned())].into(),

@@ -72,7 +72,7 @@ struct Worlds {
 }
 
 fn id(number: u8) -> UnitId {
-    Id::from_bytes([number; 16])
+    id(number)
 }
 
 fn tournament_of(room: u8) -> u8 {

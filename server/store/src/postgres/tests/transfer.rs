@@ -199,7 +199,7 @@ async fn a_name_that_no_index_takes_does_not_prevent_a_move() {
         }],
         ..*summary(1)
     };
-    let imported = source.import(Id::from_bytes([1; 16]), long, Arc::from([]));
+    let imported = source.import(id(1), long, Arc::from([]));
     assert_eq!(imported.await, Ok(true));
     source.close().await;
     drop(source);

@@ -96,8 +96,8 @@ pub(crate) fn every_entry() -> Vec<TournamentEntry> {
         }),
         TournamentEntry::Placed {
             game: 1,
-            room_id: Id::from_bytes([3; 16]),
-            game_id: Id::from_bytes([4; 16]),
+            room_id: id(3),
+            game_id: id(4),
         },
         change(Change::Rescheduled {
             game: 1,
@@ -163,7 +163,7 @@ async fn stored_tournaments_are_read_back_in_order() {
         let made = store.create_tournament(header, begins_with.to_vec());
         made.await.expect("committed");
     }
-    let stored = store.append_tournament(Id::from_bytes([3; 16]), 1, rest.to_vec());
+    let stored = store.append_tournament(id(3), 1, rest.to_vec());
     stored.await.expect("committed");
     store.close().await;
     drop(store);
@@ -209,9 +209,9 @@ fn the_encoding_of_tournaments_stays_readable() {
 
 #[test]
 fn a_game_keeps_the_id_of_its_tournament() {
-    for series in [None, Some(Id::from_bytes([5; 16]))] {
+    for series in [None, Some(id(5))] {
         let game = TournamentGame {
-            tournament: Id::from_bytes([6; 16]),
+            tournament: id(6),
             series,
         };
         let header = GameHeader {
