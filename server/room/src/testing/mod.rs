@@ -146,12 +146,28 @@ impl Table {
         table
     }
 
+    /// Creates a room at the start of the second Shift, in which these seats hold the jokers.
+    pub fn with_jokers_at(policy: Policy, fills: Vec<Fill>, holders: [Seat; 2]) -> Self {
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, holders).expect("every seat has cards to swap");
+        let mut table = Self::scripted(policy, fills, rules, second_shift(hands));
+        table.fill();
+        table
+    }
+
     pub fn fill(&mut self) {
-        let seats: Vec<Seat> = self.core.all_seats().collect();
-        for _ in &seats {
-            let _ = self.join(ParticipantKind::Agent);
-        }
-        for seat in seats {
+        self.join_all(ParticipantKind::Agent);
+        self.attach_all();
+    }
+
+    /// Takes all free seats.
+    pub fn join_all(&mut self, kind: ParticipantKind) {
+        while self.join(kind).is_ok() {}
+    }
+
+    pub fn attach_all(&mut self) {
+        for seat in self.core.all_seats() {
             self.attach(seat);
         }
     }
@@ -230,6 +246,13 @@ impl Table {
         seat
     }
 
+    /// Plays until a seat has to decide.
+    pub fn play_until(&mut self, seat: Seat) {
+        while self.open().0 != seat {
+            self.play_one();
+        }
+    }
+
     pub fn commit(&mut self) {
         self.journal.append(self.core.pending());
         self.now += std::mem::take(&mut self.store_takes);
@@ -245,6 +268,20 @@ impl Table {
                 _ => None,
             })
             .expect("a decision has been taken")
+    }
+
+    /// All decisions, with their seats.
+    pub fn decided(&self) -> Vec<(Seat, ActionId)> {
+        let decided = |entry: &Entry| match &entry.change {
+            Change::Decided(decided) => Some((decided.seat, decided.action)),
+            _ => None,
+        };
+        self.journal.iter().filter_map(decided).collect()
+    }
+
+    /// How often a substitute has taken a seat.
+    pub fn substituted(&self) -> usize {
+        self.happened(|event| matches!(event, RoomEvent::Substituted(_)))
     }
 
     pub fn happened(&self, wanted: impl Fn(&RoomEvent) -> bool) -> usize {
@@ -272,6 +309,11 @@ impl Table {
             self.core.open().map(|open| (open.decision, open.id))
         );
     }
+}
+
+/// The connection that a seat got when its table was filled.
+pub fn first_connection(seat: Seat) -> ConnectionId {
+    ConnectionId(seat.index() as u64 + 1)
 }
 
 /// The second Shift of a game, in which the seats were ranked by their numbers.
@@ -351,8 +393,13 @@ pub fn study_member(number: u32, participant: &str, seat: usize) -> StudyMember 
 
 /// Rules for games of one Shift.
 pub fn one_shift() -> RuleSetSpec {
+    shifts(1)
+}
+
+/// Rules for games of a number of Shifts.
+pub fn shifts(count: u32) -> RuleSetSpec {
     RuleSetSpec {
-        stop: Stop::Shifts(1),
+        stop: Stop::Shifts(count),
         ..RuleSetSpec::default()
     }
 }

@@ -70,6 +70,12 @@ async fn a_game_is_found_by_a_name_of_any_length() {
     .await;
 }
 
+/// What is looked for, after which number, and how many at most; what is found.
+type Case = (fn(&mut v1::RecordFilter), (u64, usize), &'static [u64]);
+
+/// The first games, as many as there are.
+const ALL: (u64, usize) = (0, 9);
+
 async fn check(store: &dyn Store) {
     for game in 1..=5 {
         let header = Arc::new(GameHeader {
@@ -82,9 +88,6 @@ async fn check(store: &dyn Store) {
     // Nothing was dealt in it, so it has no record.
     let mut abandoned = created(store, 6, Durability::Durable).await;
     abandoned.finish(None, None).await.expect("committed");
-    const ALL: (u64, usize) = (0, 9);
-    /// What is looked for, after which number, and how many at most; what is found.
-    type Case = (fn(&mut v1::RecordFilter), (u64, usize), &'static [u64]);
     let table: [Case; 15] = [
         (|_| {}, ALL, &[1, 2, 3, 4, 5]),
         (|_| {}, (0, 2), &[1, 2]),
