@@ -26,7 +26,7 @@ use crate::studies::StudyHeader;
 use crate::testing::{TypedUnits as _, begin, cup, end, ended};
 use crate::tournaments::TournamentEntry;
 use crate::{Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame};
-use chefshat_room::ids::{GameId, Id, SecretHash};
+use chefshat_room::ids::{GameId, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
     ParticipantKind, RecordedSeat, SeatLabels, SeatedParticipant, Source, StudyGame, TakenOver,

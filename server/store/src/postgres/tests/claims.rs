@@ -6,7 +6,7 @@ use super::fencing::Pair;
 use super::*;
 use crate::form::FORM;
 use crate::studies::StudyHeader;
-use chefshat_room::ids::{Id, UnitId};
+use chefshat_room::ids::UnitId;
 
 const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
@@ -15,7 +15,7 @@ const LOOKS: u32 = 10_000;
 
 async fn create(store: &PostgresStore, rooms: impl IntoIterator<Item = u8>) {
     for room in rooms {
-        created(&store, room).await;
+        created(store, room).await;
     }
 }
 
@@ -186,7 +186,7 @@ async fn what_is_claimed_has_the_form_of_its_new_owner() {
     create(&pair.first, [1]).await;
     let first = &pair.first;
     for number in [2, 3] {
-        create_cup(&first, number).await;
+        create_cup(first, number).await;
         let study = StudyHeader {
             id: id(number + 2),
             settings: v1::StudySettings::default(),

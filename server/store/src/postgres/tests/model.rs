@@ -71,10 +71,6 @@ struct Worlds {
     written: u64,
 }
 
-fn id(number: u8) -> UnitId {
-    id(number)
-}
-
 fn tournament_of(room: u8) -> u8 {
     room - room % 10
 }

@@ -9,6 +9,7 @@ use crate::testing::folded;
 use crate::tournaments::StoredTournament;
 use crate::{DATABASE_FILE, OpenError, SqliteStore};
 use chefshat_room::Core;
+use chefshat_room::ids::Id;
 
 /// A folder with the database that an earlier version wrote.
 fn earlier_version() -> tempfile::TempDir {
