@@ -24,7 +24,6 @@ use crate::ephemeral::{BLOCK, EphemeralJournal, Scratch, StoreFinished};
 use crate::form;
 use crate::studies::StudyHeader;
 use crate::testing::{TypedUnits as _, begin, cup, end, ended};
-use crate::tournaments::TournamentEntry;
 use crate::{Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame};
 use chefshat_room::ids::{GameId, SecretHash};
 use chefshat_room::journal::{

@@ -3,7 +3,7 @@
 
 use chefshat_tournament::{Change, Format, State};
 
-use super::support::{begun, drawn, end, follow, order, play_through, played, settings};
+use super::support::{begun, drawn, end, follow, order, play_through, played, settings, won_by};
 
 #[test]
 fn sixteen_become_eight_become_four() {
