@@ -35,5 +35,5 @@ pub use duplicate::{
     SeatPlan, Seating, Tally,
 };
 pub use fold::Progress;
-pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};
+pub use rules_form::{RulesForm, RulesFormError};
 pub use table::{BatchTable, SeatTable};

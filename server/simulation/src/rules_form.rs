@@ -26,34 +26,32 @@ pub struct RulesForm {
     /// Whether special actions may be declared.
     pub special_actions: bool,
     /// `golden` or `any_top_face`.
-    pub opening: OpeningName,
+    #[serde(with = "OpeningName")]
+    pub opening: Opening,
     /// Whether a Shift's first turn may be a pass.
     pub opening_pass: bool,
     /// `pizza` or `turn`.
-    pub pass_scope: PassScopeName,
+    #[serde(with = "PassScopeName")]
+    pub pass_scope: PassScope,
     /// Consecutive pizzas without a play after which somebody must play.
     pub max_idle_pizzas: u32,
     /// Turns that end a Shift.
     pub max_turns: u32,
 }
 
-/// The opening, by name.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OpeningName {
-    /// The Golden card.
+/// The names of the openings.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Opening", rename_all = "snake_case")]
+enum OpeningName {
     Golden,
-    /// Any card of the top face.
     AnyTopFace,
 }
 
-/// The scope of a pass, by name.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PassScopeName {
-    /// Until the next pizza.
+/// The names of the scopes of a pass.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "PassScope", rename_all = "snake_case")]
+enum PassScopeName {
     Pizza,
-    /// For that turn.
     Turn,
 }
 
@@ -84,15 +82,9 @@ impl From<&RuleSet> for RulesForm {
             points: spec.points,
             exchange: spec.exchange,
             special_actions: spec.special_actions,
-            opening: match spec.opening {
-                Opening::Golden => OpeningName::Golden,
-                Opening::AnyTopFace => OpeningName::AnyTopFace,
-            },
+            opening: spec.opening,
             opening_pass: spec.opening_pass,
-            pass_scope: match spec.pass_scope {
-                PassScope::Pizza => PassScopeName::Pizza,
-                PassScope::Turn => PassScopeName::Turn,
-            },
+            pass_scope: spec.pass_scope,
             max_idle_pizzas: spec.max_idle_pizzas,
             max_turns: spec.max_turns,
         }
@@ -118,15 +110,9 @@ impl RulesForm {
             points: self.points.clone(),
             exchange: self.exchange,
             special_actions: self.special_actions,
-            opening: match self.opening {
-                OpeningName::Golden => Opening::Golden,
-                OpeningName::AnyTopFace => Opening::AnyTopFace,
-            },
+            opening: self.opening,
             opening_pass: self.opening_pass,
-            pass_scope: match self.pass_scope {
-                PassScopeName::Pizza => PassScope::Pizza,
-                PassScopeName::Turn => PassScope::Turn,
-            },
+            pass_scope: self.pass_scope,
             max_idle_pizzas: self.max_idle_pizzas,
             max_turns: self.max_turns,
         };

@@ -6,11 +6,12 @@ mod failing;
 use std::sync::Arc;
 
 use async_trait::async_trait;
-use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
+use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1;
-use chefshat_room::ids::{Id, SecretHash, StudyId, TournamentId};
-use chefshat_room::journal::{Fill, GameHeader, GameStart};
+use chefshat_room::ids::{GameId, SecretHash, StudyId, TournamentId};
+use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::{Durability, Policy};
+use chefshat_room::testing::{self, OPEN, id};
 use chefshat_study::Change;
 use chefshat_tournament::Tournament;
 use chefshat_wire::convert::tournament_plan;
@@ -21,7 +22,7 @@ pub use failing::{FailingStore, Read};
 use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};
 use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use crate::units::{StoredTraces, UnitKey, UnitRow, UnitWrite};
-use crate::{Store, StoreError, units_of};
+use crate::{Journal, Store, StoreError, StoredGame, units_of};
 
 type Written = Result<(), StoreError>;
 
@@ -134,34 +135,44 @@ fn tournament_row(position: u64, entries: &[TournamentEntry]) -> UnitRow {
     }
 }
 
+/// Creates a game.
+pub async fn begin(
+    store: &(impl Store + ?Sized),
+    header: &Arc<GameHeader>,
+    entries: Vec<Entry>,
+) -> Box<dyn Journal> {
+    let created = store.create(Arc::clone(header), entries).await;
+    created.expect("a new game")
+}
+
+/// Ends a game.
+pub async fn end(journal: &mut Box<dyn Journal>, summary: Box<v1::RecordSummary>) {
+    let ended = journal.finish(Some(summary), None).await;
+    ended.expect("committed");
+}
+
+/// The entries of a hosted game that has ended.
+pub async fn ended(store: &(impl Store + ?Sized), game: GameId) -> Vec<Entry> {
+    let stored = store.finished(game).await.expect("readable");
+    let Some(StoredGame::Hosted(_, entries, _)) = stored else {
+        panic!("not stored: {stored:?}");
+    };
+    entries.to_vec()
+}
+
 /// The header of a game with this number.
 pub fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
+    let policy = Policy {
+        durability,
+        ..Policy::default()
+    };
     Arc::new(GameHeader {
-        room_id: Id::from_bytes([game.wrapping_add(200); 16]),
-        game_id: Id::from_bytes([game; 16]),
+        room_id: id(game.wrapping_add(200)),
+        game_id: id(game),
         name: format!("game {game}"),
-        rules: RuleSetSpec::default().validate().expect("the standard"),
-        policy: Policy {
-            durability,
-            ..Policy::default()
-        },
-        rules_version: RULES_VERSION,
-        server_version: "0.0.1".into(),
-        participant_removed: false,
-        fills: vec![Fill::Open { reserved_for: None }; 4],
-        display_names: Default::default(),
-        wizards: std::collections::BTreeSet::new(),
-        recorded: Default::default(),
-        start: GameStart::default(),
-        seed: SeedPlan::Fixed {
-            game_seed: [game; 32],
-        },
         created_at_ms: 1_000,
         join_code: format!("ABCDE{game:03}"),
-        owner: SecretHash::of(b"owner"),
-        tournament: None,
-        table: None,
-        study: None,
+        ..testing::header(policy, vec![OPEN; 4], RuleSetSpec::default())
     })
 }
 
@@ -180,7 +191,7 @@ pub fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
 /// The header of a tournament with this number.
 pub fn cup(number: u8) -> TournamentHeader {
     TournamentHeader {
-        id: Id::from_bytes([number; 16]),
+        id: id(number),
         settings: v1::TournamentSettings {
             name: "Coppa dello chef".into(),
             format: v1::TournamentFormat::Swiss.into(),

@@ -6,13 +6,15 @@ mod retained;
 mod studies;
 mod tournaments;
 
-use chefshat_room::ids::{GameId, Id, SecretHash};
+use std::path::Path;
+
 use chefshat_room::journal::{Change, Fill};
 use chefshat_room::policy::Durability;
+use chefshat_room::testing::id;
 use futures::FutureExt as _;
 
 use super::*;
-use crate::testing::{TypedUnits as _, cup, header, summary};
+use crate::testing::{TypedUnits as _, begin, cup, end, header, summary};
 
 /// Runs a check with a new store of each kind.
 async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
@@ -22,12 +24,34 @@ async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
 
 /// Runs a check with a new database of each kind.
 async fn with_each_database(check: impl AsyncFn(&dyn Store)) {
+    with_each_tables(async |store, _| check(store).await).await;
+}
+
+/// The tables below a store.
+enum Tables<'a> {
+    Sqlite(&'a Path),
+    Postgres(&'a chefshat_postgres::Database),
+}
+
+impl Tables<'_> {
+    /// Executes a statement that both databases know.
+    async fn edit(&self, statement: &str) {
+        match self {
+            Self::Sqlite(folder) => sqlite::tests::edit(folder, statement).await,
+            Self::Postgres(database) => drop(database.run(statement)),
+        }
+    }
+}
+
+/// Runs a check with a new database of each kind and its tables.
+async fn with_each_tables(check: impl AsyncFn(&dyn Store, Tables<'_>)) {
     let folder = tempfile::tempdir().expect("a folder");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
-    check(&store).await;
+    check(&store, Tables::Sqlite(folder.path())).await;
     store.close().await;
-    let store = postgres::tests::node(&chefshat_postgres::database()).await;
-    check(&store).await;
+    let database = chefshat_postgres::database();
+    let store = postgres::tests::node(&database).await;
+    check(&store, Tables::Postgres(&database)).await;
     store.close().await;
 }
 
@@ -39,13 +63,11 @@ fn entry() -> Entry {
 }
 
 async fn created(store: &dyn Store, game: u8, durability: Durability) -> Box<dyn Journal> {
-    let created = store.create(header(game, durability), vec![entry()]).await;
-    created.expect("a new game")
+    begin(store, &header(game, durability), vec![entry()]).await
 }
 
 async fn finish(journal: &mut Box<dyn Journal>, game: u8) {
-    let finished = journal.finish(Some(summary(&header(game, Durability::Durable))), None);
-    finished.await.expect("committed");
+    end(journal, summary(&header(game, Durability::Durable))).await;
 }
 
 /// Names and numbers of the finished games after a number.
@@ -67,10 +89,8 @@ async fn a_cursor_reaches_every_game_that_finishes_later() {
             } else {
                 4
             };
-            let before = listed(store, 0)
-                .await
-                .last()
-                .map_or(0, |(_, number)| *number);
+            let listed_before = listed(store, 0).await;
+            let before = listed_before.last().map_or(0, |(_, number)| *number);
             let mut first = created(store, base, durability).await;
             let mut second = created(store, base + 1, durability).await;
             finish(&mut second, base + 1).await;
@@ -116,6 +136,11 @@ async fn a_signature_is_stored_with_the_end_of_its_game() {
     .await;
 }
 
+async fn written(store: &dyn Store, game: u8) {
+    let written = store.mark_record_written(id(game)).await;
+    written.expect("committed");
+}
+
 /// Ids of the games that need not be kept, as their first bytes.
 async fn prunable(store: &dyn Store, keep: Keep) -> Vec<u8> {
     let found = store.prunable(keep, 0, 9).await.expect("readable");
@@ -143,16 +168,10 @@ async fn the_newest_games_are_those_that_ended_last() {
         for game in [2, 3, 4] {
             let mut journal = created(store, game, Durability::Durable).await;
             finish(&mut journal, game).await;
-            store
-                .mark_record_written(Id::from_bytes([game; 16]))
-                .await
-                .expect("it");
+            written(store, game).await;
         }
         finish(&mut first, 1).await;
-        store
-            .mark_record_written(Id::from_bytes([1; 16]))
-            .await
-            .expect("it");
+        written(store, 1).await;
         assert_eq!(prunable(store, newest(1)).await, [2, 3, 4]);
         assert_eq!(prunable(store, newest(2)).await, [2, 3]);
         assert_eq!(prunable(store, newest(4)).await, [0; 0]);
@@ -168,7 +187,7 @@ async fn the_newest_games_are_those_that_ended_last() {
         let found = store.prunable(newest(1), 0, 1).await.expect("readable");
         let after = store.prunable(newest(1), found[0].0, 9).await;
         assert_eq!(after.expect("readable").len(), 2, "{found:?}");
-        let deleted: Vec<GameId> = [2, 3, 4].map(|game| Id::from_bytes([game; 16])).into();
+        let deleted = [2, 3, 4].map(id).into();
         store.delete(deleted).await.expect("committed");
         let left = listed(store, 0).await;
         assert_eq!(left, [("game 1".into(), 4)]);
@@ -184,14 +203,10 @@ async fn an_import_is_kept_from_the_time_of_its_import() {
         assert_eq!(import.await, Ok(true));
         let mut newer = created(store, 2, Durability::Durable).await;
         finish(&mut newer, 2).await;
-        store
-            .mark_record_written(Id::from_bytes([2; 16]))
-            .await
-            .expect("it");
+        written(store, 2).await;
         if store.outlives_server() {
             assert_eq!(prunable(store, newest(1)).await, [0; 0], "no record yet");
-            let written = store.mark_record_written(last_year.game_id);
-            written.await.expect("committed");
+            written(store, 1).await;
         }
         assert_eq!(prunable(store, newest(1)).await, [1]);
         assert_eq!(prunable(store, since(3_000)).await, [0; 0], "just imported");
@@ -217,13 +232,10 @@ async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
         let (mut journals, refused) = futures::join!(futures::future::join_all(others), refused);
         assert!(refused.is_err());
         finish(&mut journals[0], 2).await;
-        let game = store
-            .finished(Id::from_bytes([2; 16]))
-            .await
-            .expect("readable");
+        let game = store.finished(id(2)).await.expect("readable");
         assert!(game.is_some(), "the store keeps working");
         assert_eq!(import().await, Ok(false));
-        let taken = store.import(Id::from_bytes([2; 16]), *summary(&forged), Arc::from([]));
+        let taken = store.import(id(2), *summary(&forged), Arc::from([]));
         assert_eq!(taken.await, Ok(false));
         assert!(store.failed().now_or_never().is_none(), "no failure");
     })
@@ -254,12 +266,9 @@ async fn an_import_does_not_take_the_id_of_a_running_game() {
         let imported = header(3, Durability::Ephemeral);
         let import = store.import(imported.game_id, *summary(&imported), Arc::from([]));
         assert_eq!(import.await, Ok(true));
+        let taken = imported.game_id.to_string();
         let refused = store.create(imported, vec![entry()]).await;
-        let refused = refused.err().expect("the id is taken");
-        assert_eq!(
-            refused,
-            StoreError::Taken(GameId::from_bytes([3; 16]).to_string())
-        );
+        assert_eq!(refused.err(), Some(StoreError::Taken(taken)));
         // A game that ended without a record leaves its id.
         let mut journal = created(store, 4, Durability::Ephemeral).await;
         journal.finish(None, None).await.expect("committed");
@@ -275,26 +284,21 @@ async fn an_import_does_not_take_the_id_of_a_running_game() {
 #[tokio::test]
 async fn a_text_that_no_database_can_search_for_is_stored() {
     with_each_store(async |store| {
-        let strange = header(1, Durability::Durable);
-        let strange = GameHeader {
+        let strange = Arc::new(GameHeader {
             name: "nothing\0behind".into(),
-            ..GameHeader::clone(&strange)
-        };
-        let created = store.create(Arc::new(strange.clone()), vec![entry()]).await;
-        let mut journal = created.expect("a new game");
-        let finished = journal.finish(Some(summary(&strange)), None);
-        finished.await.expect("committed");
+            ..GameHeader::clone(&header(1, Durability::Durable))
+        });
+        let mut journal = begin(store, &strange, vec![entry()]).await;
+        end(&mut journal, summary(&strange)).await;
         let by_name = v1::RecordFilter {
             room_name: strange.name.clone(),
             ..v1::RecordFilter::default()
         };
         let found = store.list(&by_name, Part::FROM_OLDEST, 9).await;
-        let found = found.expect("readable");
+        let mut found = found.expect("readable");
         assert_eq!(found.len(), 1);
-        assert_eq!(
-            found[0].summary.as_ref().expect("readable").room_name,
-            strange.name
-        );
+        let summary = found.remove(0).summary.expect("readable");
+        assert_eq!(summary.room_name, strange.name);
     })
     .await;
 }

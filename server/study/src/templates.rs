@@ -190,24 +190,16 @@ perceived_safety|calm|Agitated|Calm|Agitato/a|Calmo/a
 perceived_safety|surprised|Quiescent|Surprised|Quieto/a|Sorpreso/a";
 
 fn godspeed(texts: Texts) -> Vec<Item> {
-    let item = |[scale, id, left_en, right_en, left_it, right_it]: [&str; 6]| {
+    let item = |row: [&str; 6]| {
         // The last scale is about the participant, not about the robot.
-        let text = match scale {
+        let text = match row[0] {
             "perceived_safety" => texts.choose(
                 "Please rate your emotional state.",
                 "Valuta il tuo stato emotivo.",
             ),
             _ => "",
         };
-        let kind = ItemKind::SemanticDifferential {
-            points: 5,
-            left: texts.choose(left_en, left_it).to_owned(),
-            right: texts.choose(right_en, right_it).to_owned(),
-        };
-        Item {
-            scale: scale.to_owned(),
-            ..Item::new(id, text, kind)
-        }
+        differential(texts, text, 5, row)
     };
     rows(GODSPEED).map(item).collect()
 }
@@ -248,18 +240,22 @@ hedonic_quality|inventive|Conventional|Inventive|Konventionell|Originell
 hedonic_quality|leading_edge|Usual|Leading edge|Herkömmlich|Neuartig";
 
 fn ueq_s(texts: Texts) -> Vec<Item> {
-    let item = |[scale, id, left_en, right_en, left_de, right_de]: [&str; 6]| {
-        let kind = ItemKind::SemanticDifferential {
-            points: 7,
-            left: texts.choose(left_en, left_de).to_owned(),
-            right: texts.choose(right_en, right_de).to_owned(),
-        };
-        Item {
-            scale: scale.to_owned(),
-            ..Item::new(id, "", kind)
-        }
-    };
+    let item = |row| differential(texts, "", 7, row);
     rows(UEQ_S).map(item).collect()
+}
+
+/// An item between two words, of a row with its scale, its id and the words in both languages.
+fn differential(texts: Texts, text: &str, points: u32, row: [&str; 6]) -> Item {
+    let [scale, id, left_en, right_en, left, right] = row;
+    let kind = ItemKind::SemanticDifferential {
+        points,
+        left: texts.choose(left_en, left).to_owned(),
+        right: texts.choose(right_en, right).to_owned(),
+    };
+    Item {
+        scale: scale.to_owned(),
+        ..Item::new(id, text, kind)
+    }
 }
 
 /// The rows of a table above.

@@ -9,6 +9,9 @@ use chefshat_agents::AgentKind;
 
 use crate::{Deals, Entrant, Format, ParticipantKind, Settings, Tournament};
 
+/// How long [`settings`] let a game wait.
+pub const NO_SHOW_MS: u64 = 1000;
+
 /// Settings of a tournament of up to 64 participants in games of four.
 pub fn settings(format: Format) -> Settings {
     Settings {
@@ -20,7 +23,7 @@ pub fn settings(format: Format) -> Settings {
         deals: Deals::Independent,
         max_participants: 64,
         start_when_joined: None,
-        no_show_ms: 1000,
+        no_show_ms: NO_SHOW_MS,
         max_calls: 2,
         max_parallel: 64,
         physical_tables: 0,
@@ -66,8 +69,13 @@ pub fn begun(
     agents: impl IntoIterator<Item = Option<AgentKind>>,
 ) -> Tournament {
     let mut tournament = joined(settings, agents);
+    begin(&mut tournament);
+    tournament
+}
+
+/// Begins a tournament that enough have joined.
+pub fn begin(tournament: &mut Tournament) {
     for change in tournament.begin().unwrap() {
         tournament.fold(&change);
     }
-    tournament
 }

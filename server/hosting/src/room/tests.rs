@@ -1,13 +1,12 @@
 //! The task of a room under tokio's paused clock, with streams that do not read.
 
-use std::collections::BTreeMap;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use async_trait::async_trait;
 use chefshat_engine::SeedPlan;
-use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
+use chefshat_engine::{RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_record::signature::SigningKey;
 use futures::FutureExt as _;
@@ -30,8 +29,9 @@ use chefshat_admission::limits::{Background, Key, Payer, Searches, Shares};
 use chefshat_base::clock::RoomClock;
 use chefshat_base::metrics::{Metrics, SearchOutcome};
 use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash};
-use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
+use chefshat_room::journal::{Change, Entry, Fill, GameHeader};
 use chefshat_room::policy::{AbortPolicy, Policy};
+use chefshat_room::testing::header;
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT};
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
 use chefshat_wire::encoded::Updates;
@@ -101,32 +101,14 @@ async fn room_in(
     metrics: Arc<Metrics>,
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(shifts),
+        ..RuleSetSpec::default()
+    };
     let header = Arc::new(GameHeader {
-        room_id: Id::from_bytes([1; 16]),
-        game_id: Id::from_bytes([2; 16]),
-        name: String::new(),
-        rules: RuleSetSpec {
-            stop: Stop::Shifts(shifts),
-            ..RuleSetSpec::default()
-        }
-        .validate()
-        .expect("a valid rule set"),
-        rules_version: RULES_VERSION,
-        server_version: "0.0.1".into(),
-        participant_removed: false,
-        policy,
-        display_names: BTreeMap::new(),
-        wizards: std::collections::BTreeSet::new(),
-        recorded: BTreeMap::new(),
-        start: GameStart::default(),
-        fills,
         seed: SeedPlan::Fixed { game_seed: [3; 32] },
-        created_at_ms: 0,
-        join_code: "CODE".into(),
         owner: SecretHash::of(&OWNER),
-        tournament: None,
-        table: None,
-        study: None,
+        ..header(policy, fills, rules)
     });
     let journal = store
         .create(Arc::clone(&header), Vec::new())

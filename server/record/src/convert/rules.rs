@@ -66,33 +66,23 @@ pub fn rules_from_proto(message: &v1::RuleSet) -> Result<RuleSet, FieldProblem> 
     if !message.points.is_empty() {
         spec.points = message.points.clone();
     }
-    if let Some(exchange) = message.exchange {
-        spec.exchange = exchange;
-    }
-    if let Some(special_actions) = message.special_actions {
-        spec.special_actions = special_actions;
-    }
+    spec.exchange = message.exchange.unwrap_or(spec.exchange);
+    spec.special_actions = message.special_actions.unwrap_or(spec.special_actions);
     match v1::Opening::try_from(message.opening) {
         Ok(v1::Opening::Unspecified) => {}
         Ok(v1::Opening::Golden) => spec.opening = Opening::Golden,
         Ok(v1::Opening::AnyTopFace) => spec.opening = Opening::AnyTopFace,
-        Err(_) => return Err(unknown_value("opening", message.opening)),
+        Err(_) => return Err(FieldProblem::unknown("opening", message.opening)),
     }
-    if let Some(opening_pass) = message.opening_pass {
-        spec.opening_pass = opening_pass;
-    }
+    spec.opening_pass = message.opening_pass.unwrap_or(spec.opening_pass);
     match v1::PassScope::try_from(message.pass_scope) {
         Ok(v1::PassScope::Unspecified) => {}
         Ok(v1::PassScope::Pizza) => spec.pass_scope = PassScope::Pizza,
         Ok(v1::PassScope::Turn) => spec.pass_scope = PassScope::Turn,
-        Err(_) => return Err(unknown_value("pass_scope", message.pass_scope)),
+        Err(_) => return Err(FieldProblem::unknown("pass_scope", message.pass_scope)),
     }
-    if let Some(max_idle_pizzas) = message.max_idle_pizzas {
-        spec.max_idle_pizzas = max_idle_pizzas;
-    }
-    if let Some(max_turns) = message.max_turns {
-        spec.max_turns = max_turns;
-    }
+    spec.max_idle_pizzas = message.max_idle_pizzas.unwrap_or(spec.max_idle_pizzas);
+    spec.max_turns = message.max_turns.unwrap_or(spec.max_turns);
     spec.validate().map_err(|error| {
         let message = match error {
             // Default points of the preset follow the number of players.
@@ -185,8 +175,4 @@ pub fn reward_scheme_to_proto(scheme: Option<RewardScheme>) -> v1::RewardScheme 
 
 fn small(field: &'static str, value: u32) -> Result<u8, FieldProblem> {
     u8::try_from(value).map_err(|_| FieldProblem::new(field, format!("{value} is out of range")))
-}
-
-fn unknown_value(field: &'static str, value: i32) -> FieldProblem {
-    FieldProblem::new(field, format!("{value} is not a value of this enum"))
 }

@@ -46,6 +46,11 @@ impl TestGame<'_> {
         }
     }
 
+    /// Plays the game; every participant decides itself.
+    pub fn played(&self) -> Vec<v1::RecordLine> {
+        self.record(|_| v1::DecisionSource::Agent)
+    }
+
     /// Plays the game. `source` gives the source of each decision by its index in the game.
     pub fn record(&self, source: impl Fn(u64) -> v1::DecisionSource) -> Vec<v1::RecordLine> {
         let mut lines = Lines {
@@ -316,7 +321,7 @@ impl HiddenGolden {
         let holder = hands.seats().find(|&seat| hands[seat].has_golden());
         HiddenGolden {
             rules,
-            lines: game.record(|_| v1::DecisionSource::Agent),
+            lines: game.played(),
             holder: seat_number(holder.unwrap()),
         }
     }
@@ -324,31 +329,21 @@ impl HiddenGolden {
 
 /// The record of the same game aborted after its first `after` lines.
 pub fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLine> {
-    let reveal = lines.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
-            _ => None,
-        },
+    let reveal = events(&lines).find_map(|(_, kind)| match kind {
+        Kind::GameEnded(ended) => ended.reveal.clone(),
         _ => None,
     });
     lines.truncate(after);
-    let count = |is: fn(&Line) -> bool| {
-        let kinds = lines.iter().filter_map(|line| line.line.as_ref());
-        kinds.filter(|line| is(line)).count() as u64
-    };
-    let events = count(|line| matches!(line, Line::Event(_))) + 1;
-    let decisions = count(|line| matches!(line, Line::Decision(_)));
-    let dealt = |line: &Line| matches!(line, Line::Event(event) if matches!(event.kind, Some(Kind::ShiftStarted(_))));
-    let elapsed_ms = (lines.iter().rev()).find_map(|line| match line.line.as_ref()? {
-        Line::Event(event) => Some(event.elapsed_ms),
-        _ => None,
-    });
+    let decisions = decisions(&lines).count() as u64;
+    let is_dealt = events(&lines).any(|(_, kind)| matches!(kind, Kind::ShiftStarted(_)));
+    let elapsed_ms = events(&lines).last().map(|(event, _)| event.elapsed_ms);
+    let events = events(&lines).count() as u64 + 1;
     let end = v1::GameEvent {
         sequence: events,
         elapsed_ms: elapsed_ms.unwrap_or_default(),
         kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
             reason: v1::AbortReason::Closed.into(),
-            reveal: reveal.filter(|_| count(dealt) > 0),
+            reveal: reveal.filter(|_| is_dealt),
         }))),
         ..v1::GameEvent::default()
     };
@@ -369,6 +364,39 @@ pub fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
         Some(Line::Header(header)) => header,
         other => panic!("{other:?}"),
     }
+}
+
+/// The footer of a record.
+pub fn footer(lines: &mut [v1::RecordLine]) -> &mut v1::RecordFooter {
+    match &mut lines.last_mut().unwrap().line {
+        Some(Line::Footer(footer)) => footer,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The decisions of a record.
+pub fn decisions(lines: &[v1::RecordLine]) -> impl Iterator<Item = &v1::DecisionRecord> {
+    lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Decision(decision)) => Some(decision),
+        _ => None,
+    })
+}
+
+/// The events of a record, with what each says.
+pub fn events(lines: &[v1::RecordLine]) -> impl Iterator<Item = (&v1::GameEvent, &Kind)> {
+    lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Event(event)) => Some((event, event.kind.as_ref()?)),
+        _ => None,
+    })
+}
+
+/// The default rules for a number of Shifts.
+pub fn shifts(count: u32) -> RuleSet {
+    let spec = RuleSetSpec {
+        stop: Stop::Shifts(count),
+        ..RuleSetSpec::default()
+    };
+    spec.validate().unwrap()
 }
 
 /// The number of decisions taken over.

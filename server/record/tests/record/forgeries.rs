@@ -12,6 +12,7 @@ use chefshat_record::jsonl;
 use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_record::replay::replay;
 use chefshat_record::signature::{PublicKey, SigningKey, signer};
+use chefshat_record::testing::{aborted, footer, header};
 
 use Outcome::{Believed, Replay, Signature};
 
@@ -91,17 +92,6 @@ const FORGERIES: [Forgery; 47] = [
     ("the record signed again with another key", Believed, |lines| { let signature = SigningKey::from_seed(&[9; 32]).sign(lines); footer(lines).signature = Some(signature) }),
 ];
 
-fn header(lines: &mut Lines) -> &mut v1::RecordHeader {
-    chefshat_record::testing::header(lines)
-}
-
-fn footer(lines: &mut Lines) -> &mut v1::RecordFooter {
-    match &mut lines.last_mut().expect("a footer").line {
-        Some(Line::Footer(footer)) => footer,
-        other => panic!("{other:?}"),
-    }
-}
-
 fn decision(lines: &mut Lines, line: usize) -> &mut v1::DecisionRecord {
     match &mut lines[line - 1].line {
         Some(Line::Decision(decision)) => decision,
@@ -164,14 +154,18 @@ fn with_event(lines: &mut Lines, before: usize, kind: Kind) {
         Some(Line::Event(event)) => event.elapsed_ms,
         other => panic!("{other:?}"),
     };
+    lines.insert(before - 1, event_line(elapsed_ms, kind));
+    number_events(lines);
+}
+
+fn event_line(elapsed_ms: u64, kind: Kind) -> v1::RecordLine {
     let event = v1::GameEvent {
         elapsed_ms,
         kind: Some(kind),
         ..v1::GameEvent::default()
     };
     let line = Some(Line::Event(event));
-    lines.insert(before - 1, v1::RecordLine { line });
-    number_events(lines);
+    v1::RecordLine { line }
 }
 
 /// The third agent loses its connection a millisecond before a pass, which so becomes the server's.
@@ -192,17 +186,7 @@ fn short_absence(lines: &mut Lines) {
     let back = Kind::Returned(v1::Returned { seat: 3 });
     // From the last: after the events that follow from the pass, and before the decision.
     for (before, elapsed_ms, kind) in [(59, 143, back), (59, 143, given), (56, 142, lost)] {
-        let event = v1::GameEvent {
-            elapsed_ms,
-            kind: Some(kind),
-            ..v1::GameEvent::default()
-        };
-        lines.insert(
-            before - 1,
-            v1::RecordLine {
-                line: Some(Line::Event(event)),
-            },
-        );
+        lines.insert(before - 1, event_line(elapsed_ms, kind));
     }
     number_events(lines);
 }
@@ -336,7 +320,7 @@ fn cut_short(lines: &mut Lines) {
     let is_decision = |line: &v1::RecordLine| matches!(line.line, Some(Line::Decision(_)));
     let cut = 8 + lines[8..].iter().position(is_decision).expect("a decision");
     let signature = footer(lines).signature.take();
-    *lines = chefshat_record::testing::aborted(lines.clone(), cut);
+    *lines = aborted(lines.clone(), cut);
     for seat in &mut header(lines).seats {
         seat.substituted = false;
     }
@@ -454,12 +438,7 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
         seats: vec![seat(0, "0123456789abcdef"), seat(1, "")],
         ..v1::RecordHeader::default()
     };
-    let event = |kind| {
-        Line::Event(v1::GameEvent {
-            kind: Some(kind),
-            ..v1::GameEvent::default()
-        })
-    };
+    let event = |kind| event_line(0, kind);
     let seated = |seat| {
         event(Kind::Seated(Box::new(v1::Seated {
             seat,
@@ -473,8 +452,10 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
             ..v1::ExpressionShown::default()
         })))
     };
-    let lines = vec![
-        Line::Header(Box::new(header)),
+    let lines = [
+        v1::RecordLine {
+            line: Some(Line::Header(Box::new(header))),
+        },
         // One of the name leaves before the game: the record does not say which.
         seated(0),
         event(Kind::Vacated(v1::Vacated { seat: 0 })),
@@ -483,10 +464,6 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
         shown(0),
         shown(1),
     ];
-    let lines = lines
-        .into_iter()
-        .map(|line| v1::RecordLine { line: Some(line) });
-    let lines: Vec<v1::RecordLine> = lines.collect();
     for (fingerprint, names, expressions) in [
         (Some("0123456789abcdef"), 2, 1),
         (Some(""), 2, 1),
@@ -501,7 +478,7 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
             pseudonym: "deleted participant".into(),
             key: None,
         };
-        let mut redacted = lines.clone();
+        let mut redacted = lines.to_vec();
         let found = who.redact(&mut redacted);
         assert_eq!(
             (found.names, found.expressions),

@@ -27,7 +27,7 @@ fn short_game() -> TestGame<'static> {
 fn edited_records_are_verified_or_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("record.jsonl");
-    let lines = short_game().record(|_| chefshat_proto::v1::DecisionSource::Agent);
+    let lines = short_game().played();
     jsonl::write(&file, &lines).unwrap();
     let original = std::fs::read(&file).unwrap();
     replays(&file).unwrap();
@@ -50,7 +50,7 @@ fn replays(file: &Path) -> Result<(), String> {
 
 #[test]
 fn edited_transcripts_are_imported_or_refused() {
-    let lines = short_game().record(|_| chefshat_proto::v1::DecisionSource::Agent);
+    let lines = short_game().played();
     let originals = [Observed::TURNS, Observed::EVERYTHING]
         .map(|observed| transcript(&short_game().rules, &lines, observed));
     for original in &originals {

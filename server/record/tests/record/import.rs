@@ -7,10 +7,10 @@ mod refused;
 use std::fmt::Write as _;
 
 use chefshat_engine::{RuleSetSpec, Stop};
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind};
 use chefshat_record::import::import;
 use chefshat_record::replay::replay;
-use chefshat_record::testing::{Observed, TestGame, transcript};
+use chefshat_record::testing::{Observed, TestGame, decisions, events, header, transcript};
 
 fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {
     RuleSetSpec {
@@ -23,12 +23,8 @@ fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {
 
 /// The public events of a game, without sequence numbers and cards that may be unknown.
 fn public_events(lines: &[v1::RecordLine]) -> Vec<String> {
-    let kinds = lines.iter().filter_map(|line| match &line.line {
-        Some(Line::Event(event)) => event.kind.clone(),
-        _ => None,
-    });
-    kinds
-        .filter_map(|kind| match kind {
+    events(lines)
+        .filter_map(|(_, kind)| match kind {
             Kind::Seated(_) | Kind::GameStarted(_) => None,
             Kind::ShiftStarted(started) => Some(format!("Shift {}", started.shift)),
             Kind::CardsExchanged(exchanged) => Some(format!(
@@ -74,8 +70,7 @@ fn any_transcript_of_a_game_becomes_a_record_that_verifies() {
     for spec in specs {
         let rules = spec.validate().unwrap();
         for chance in 0..2 {
-            let played = TestGame::dealt(rules, 7 + chance, chance.into())
-                .record(|_| v1::DecisionSource::Agent);
+            let played = TestGame::dealt(rules, 7 + chance, chance.into()).played();
             for observed in observations {
                 let text = transcript(&rules, &played, observed);
                 let record = import(text.as_bytes())
@@ -96,7 +91,7 @@ fn any_transcript_of_a_game_becomes_a_record_that_verifies() {
 #[test]
 fn a_transcript_that_breaks_off_becomes_an_aborted_game() {
     let rules = spec(4, 11, 3).validate().unwrap();
-    let played = TestGame::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
+    let played = TestGame::dealt(rules, 5, 9).played();
     let turns = public_events(&played)
         .iter()
         .filter(|event| event.starts_with("Play(") || event.starts_with("Pass("))
@@ -133,18 +128,13 @@ fn documented() -> String {
 #[test]
 fn the_documented_transcript_becomes_a_record() {
     let text = documented();
-    let record = import(text.as_bytes()).unwrap();
-    assert_eq!(
-        record,
-        import(text.as_bytes()).unwrap(),
-        "the result is deterministic"
-    );
+    let mut record = import(text.as_bytes()).unwrap();
+    let again = import(text.as_bytes()).unwrap();
+    assert_eq!(record, again, "the result is deterministic");
     let replayed = replay(&record).unwrap();
     assert_eq!((replayed.decisions, replayed.events), (7, 17));
     assert_eq!(replayed.standings[0].seat, 0);
-    let Some(Line::Header(header)) = &record[0].line else {
-        panic!("{:?}", record[0])
-    };
+    let header = header(&mut record);
     assert_eq!(header.origin(), v1::GameOrigin::Imported);
     assert_eq!(header.room_name, "Lab table 3");
     assert_eq!(header.created_at_ms, 1_773_500_400_000);
@@ -155,24 +145,14 @@ fn the_documented_transcript_becomes_a_record() {
             .iter()
             .all(|(seat, hand, mask)| (*hand, *mask) == (*seat == 0, *seat == 0))
     );
-    let times: Vec<(u64, u64)> = record
-        .iter()
-        .filter_map(|line| match &line.line {
-            Some(Line::Decision(decision)) => {
-                Some((decision.elapsed_ms, decision.decision_time_us))
-            }
-            _ => None,
-        })
-        .collect();
+    let times = decisions(&record).map(|it| (it.elapsed_ms, it.decision_time_us));
+    let times: Vec<(u64, u64)> = times.collect();
     assert_eq!(
         times[..3],
         [(4500, 3_100_000), (9000, 2_250_000), (12_000, 1_000_000)]
     );
-    let shown = record.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::ExpressionShown(shown)) => Some((event.elapsed_ms, shown.seat)),
-            _ => None,
-        },
+    let shown = events(&record).find_map(|(event, kind)| match kind {
+        Kind::ExpressionShown(shown) => Some((event.elapsed_ms, shown.seat)),
         _ => None,
     });
     assert_eq!(shown, Some((12_500, 0)));
@@ -181,14 +161,11 @@ fn the_documented_transcript_becomes_a_record() {
 /// A complete transcript of the second Shift of a game, without the first.
 fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
     let rules = spec(4, 11, 2).validate().unwrap();
-    let played = TestGame::dealt(rules, 11, 2).record(|_| v1::DecisionSource::Agent);
+    let played = TestGame::dealt(rules, 11, 2).played();
     let complete = transcript(&rules, &played, Observed::EVERYTHING);
     let (_, second) = complete.split_once("\n2,").unwrap();
-    let ended = played.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::ShiftEnded(ended)) => Some(ended.clone()),
-            _ => None,
-        },
+    let ended = events(&played).find_map(|(_, kind)| match kind {
+        Kind::ShiftEnded(ended) => Some(ended.clone()),
         _ => None,
     });
     let ended = ended.unwrap();

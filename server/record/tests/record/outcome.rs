@@ -1,25 +1,16 @@
 //! Outcomes: what each seat did in a game, and which games count for ratings.
 
 use crate::fixture;
-use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
 use chefshat_record::rated::rated;
 use chefshat_record::replay::replay;
 use chefshat_record::summary::summary;
-use chefshat_record::testing::{TestGame, header};
-
-fn rules() -> RuleSet {
-    let spec = RuleSetSpec {
-        stop: Stop::Shifts(3),
-        ..RuleSetSpec::default()
-    };
-    spec.validate().unwrap()
-}
+use chefshat_record::testing::{TestGame, decisions, footer, header, shifts};
 
 /// The record of a game that a server dealt, in which every participant decided itself.
 fn dealt() -> Vec<v1::RecordLine> {
-    let mut lines = TestGame::dealt(rules(), 7, 3).record(|_| DecisionSource::Agent);
+    let mut lines = TestGame::dealt(shifts(3), 7, 3).played();
     header(&mut lines).origin = v1::GameOrigin::Dealt.into();
     lines
 }
@@ -29,6 +20,13 @@ fn last<T>(lines: &mut [v1::RecordLine], of: impl Fn(&mut Line) -> Option<&mut T
     lines
         .find_map(|line| line.line.as_mut().and_then(&of))
         .unwrap()
+}
+
+fn last_decision(lines: &mut [v1::RecordLine]) -> &mut v1::DecisionRecord {
+    last(lines, |line| match line {
+        Line::Decision(decision) => Some(decision),
+        _ => None,
+    })
 }
 
 fn standings(lines: &mut [v1::RecordLine]) -> &mut Vec<v1::Standing> {
@@ -115,7 +113,7 @@ fn outcomes_agree_with_a_count_of_the_file() {
 fn the_performance_score_equals_the_engines() {
     use chefshat_engine::{ActionId, Game, MetricsRecorder, Seed};
     let lines = dealt();
-    let mut recorder = MetricsRecorder::new(rules(), None);
+    let mut recorder = MetricsRecorder::new(shifts(3), None);
     let mut scores = Vec::new();
     let mut note = |event: chefshat_engine::Event| {
         if let Some(shift) = recorder.on_event(&event) {
@@ -126,12 +124,10 @@ fn the_performance_score_equals_the_engines() {
                 .collect();
         }
     };
-    let mut game = Game::new(rules(), Seed([7; 32]), &mut note);
-    for line in &lines {
-        if let Some(Line::Decision(decision)) = &line.line {
-            let action = ActionId::new(u16::try_from(decision.action).unwrap());
-            game.apply(action, &mut note).unwrap();
-        }
+    let mut game = Game::new(shifts(3), Seed([7; 32]), &mut note);
+    for decision in decisions(&lines) {
+        let action = ActionId::new(u16::try_from(decision.action).unwrap());
+        game.apply(action, &mut note).unwrap();
     }
     let outcome = outcome(&lines).unwrap();
     assert_eq!(scores.len(), 4);
@@ -147,28 +143,18 @@ fn the_performance_score_equals_the_engines() {
 fn a_game_in_which_all_decided_themselves_is_rated() {
     let played = outcome(&dealt()).unwrap();
     assert!(played.is_rated());
-    let decisions: u64 = played
-        .seats
-        .iter()
-        .map(|seat| seat.statistics.decisions)
-        .sum();
+    let counted = played.seats.iter().map(|seat| seat.statistics.decisions);
+    let counted: u64 = counted.sum();
     let lines = dealt();
-    let stated = lines
-        .iter()
-        .filter(|line| matches!(line.line, Some(Line::Decision(_))));
-    assert_eq!(decisions, stated.count() as u64);
+    assert_eq!(counted, decisions(&lines).count() as u64);
 }
 
 #[test]
 fn default_decisions_count_and_those_of_substitutes_do_not() {
     let record = |source: fn(u64) -> DecisionSource| {
-        let mut lines = TestGame::dealt(rules(), 7, 3).record(source);
+        let mut lines = TestGame::dealt(shifts(3), 7, 3).record(source);
         header(&mut lines).origin = v1::GameOrigin::Dealt.into();
-        let decisions = lines.iter().filter_map(|line| match &line.line {
-            Some(Line::Decision(decision)) => Some(decision.source()),
-            _ => None,
-        });
-        let all: Vec<DecisionSource> = decisions.collect();
+        let all: Vec<DecisionSource> = decisions(&lines).map(|it| it.source()).collect();
         (outcome(&lines).unwrap(), all)
     };
     let sum = |outcome: &Outcome, of: usize| -> u64 {
@@ -280,10 +266,7 @@ fn a_leaderboard_rates_public_games_that_a_server_dealt() {
 #[test]
 fn a_game_in_which_a_hint_was_given_is_not_rated() {
     let mut lines = dealt();
-    let decision = last(&mut lines, |line| match line {
-        Line::Decision(decision) => Some(decision),
-        _ => None,
-    });
+    let decision = last_decision(&mut lines);
     decision.hints = 1;
     let seat = decision.seat as usize;
     let played = outcome(&lines).unwrap();
@@ -309,13 +292,7 @@ fn unfinished_games_have_no_outcome() {
         (|lines| drop(lines.remove(0)), OutcomeError::NoHeader),
         (|lines| drop(lines.pop()), OutcomeError::NotFinished),
         (
-            |lines| {
-                let footer = last(lines, |line| match line {
-                    Line::Footer(footer) => Some(footer),
-                    _ => None,
-                });
-                footer.state = v1::RoomState::Aborted.into();
-            },
+            |lines| footer(lines).state = v1::RoomState::Aborted.into(),
             OutcomeError::NotFinished,
         ),
         (
@@ -334,12 +311,6 @@ fn unfinished_games_have_no_outcome() {
     for (number, (change, expected)) in cases.into_iter().enumerate() {
         assert_eq!(broken(change), Err(expected), "case {number}");
     }
-    let strange = broken(|lines| {
-        let decision = last(lines, |line| match line {
-            Line::Decision(decision) => Some(decision),
-            _ => None,
-        });
-        decision.seat = 4;
-    });
+    let strange = broken(|lines| last_decision(lines).seat = 4);
     assert!(matches!(strange, Err(OutcomeError::Seat(_))), "{strange:?}");
 }

@@ -7,6 +7,7 @@ use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl::{self, Record};
 use chefshat_record::replay::{Replayed, walk_file};
 use chefshat_record::signature::{PublicKey, Signed, SigningKey, check};
+use chefshat_record::testing::{footer, header};
 use prost::Message as _;
 use ring::signature::Ed25519KeyPair;
 use serde_json::Value;
@@ -35,13 +36,6 @@ fn verified(record: &Record) -> Replayed {
     walk_file(record, |_| {}).expect("it replays")
 }
 
-fn footer(record: &mut Record) -> &mut v1::RecordFooter {
-    match &mut record.lines.last_mut().expect("a footer").line {
-        Some(Line::Footer(footer)) => footer,
-        other => panic!("{other:?}"),
-    }
-}
-
 fn annotations(lines: &mut [v1::RecordLine]) -> Vec<&mut v1::Annotations> {
     let decisions = lines.iter_mut().filter_map(|line| match &mut line.line {
         Some(Line::Decision(decision)) => decision.annotations.as_mut(),
@@ -66,10 +60,7 @@ fn records_signed_without_an_order_are_shown_to_be_honest_or_uncheckable() {
 
 #[test]
 fn a_forgery_is_never_signed_and_a_later_signature_never_uncheckable() {
-    let forge = |record: &mut Record| match &mut record.lines[0].line {
-        Some(Line::Header(header)) => header.room_name = "forged".into(),
-        other => panic!("{other:?}"),
-    };
+    let forge = |record: &mut Record| header(&mut record.lines).room_name = "forged".into();
     // Without maps there is one text.
     let mut ordinary = record("ordinary");
     forge(&mut ordinary);
@@ -84,17 +75,13 @@ fn a_forgery_is_never_signed_and_a_later_signature_never_uncheckable() {
     let key = known("key").parse().expect("a key");
     assert_eq!(check(&large.lines, None), Ok(Signed::Uncheckable(key)));
     // It says so of signatures of its time alone.
-    footer(&mut large)
-        .signature
-        .as_mut()
-        .expect("signed")
-        .text_version = 1;
+    let set_version = |lines: &mut [v1::RecordLine], version| {
+        let signature = footer(lines).signature.as_mut().expect("signed");
+        signature.text_version = version;
+    };
+    set_version(&mut large.lines, 1);
     assert!(check(&large.lines, None).is_err());
-    footer(&mut large)
-        .signature
-        .as_mut()
-        .expect("signed")
-        .text_version = 2;
+    set_version(&mut large.lines, 2);
     let later = check(&large.lines, None).expect_err("unknown");
     assert!(later.contains("a later version"), "{later}");
 }
@@ -104,7 +91,7 @@ fn what_is_signed_is_the_text_of_the_file() {
     // The keys of each decision in the order that is not theirs, as a version before may have
     // written and signed them; too many to try.
     let mut unsigned = record("large");
-    footer(&mut unsigned).signature = None;
+    footer(&mut unsigned.lines).signature = None;
     let mut text = String::new();
     let mut digest = [0_u8; 32];
     let count = unsigned.lines.len();
@@ -133,7 +120,7 @@ fn what_is_signed_is_the_text_of_the_file() {
     let signature = key.sign(&[b"chefshat.v1 record".as_slice(), &digest].concat());
     let public = SigningKey::from_seed(&[5; 32]).public();
     let mut signed = unsigned.clone();
-    footer(&mut signed).signature = Some(v1::RecordSignature {
+    footer(&mut signed.lines).signature = Some(v1::RecordSignature {
         public_key: public.0.to_vec(),
         signature: signature.as_ref().to_vec(),
         text_version: 0,

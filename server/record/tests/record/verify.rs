@@ -1,24 +1,16 @@
 //! Verification of records with every kind of start, and refusal of altered starts.
 
 use crate::fixture;
-use chefshat_engine::{BySeat, Game, RuleSet, RuleSetSpec, Script, Seat, SeatOrder, Seed, Stop};
+use chefshat_engine::{BySeat, Game, Script, Seat, SeatOrder, Seed};
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::branch::branch_of;
 use chefshat_record::replay::{replay, walk};
 
-use chefshat_record::testing::{TestGame, header};
-
-fn rules(shifts: u32) -> RuleSet {
-    let spec = RuleSetSpec {
-        stop: Stop::Shifts(shifts),
-        ..RuleSetSpec::default()
-    };
-    spec.validate().unwrap()
-}
+use chefshat_record::testing::{TestGame, header, shifts};
 
 /// A game that begins in its third Shift, with the hands of another deal.
 fn scripted() -> Vec<v1::RecordLine> {
-    let rules = rules(5);
+    let rules = shifts(5);
     let dealt = Game::new(rules, Seed([9; 32]), |_| {});
     let order = [2, 0, 3, 1].map(Seat::new);
     let game = TestGame {
@@ -31,18 +23,18 @@ fn scripted() -> Vec<v1::RecordLine> {
         }),
         ..TestGame::dealt(rules, 7, 3)
     };
-    game.record(|_| v1::DecisionSource::Agent)
+    game.played()
 }
 
 /// A game that branches in the middle of another.
 fn branched() -> Vec<v1::RecordLine> {
-    let before = TestGame::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
+    let before = TestGame::dealt(shifts(3), 7, 3).played();
     let branch = branch_of(&before, 100).unwrap();
     let game = TestGame {
         branch: Some(&branch),
-        ..TestGame::dealt(rules(3), 8, 4)
+        ..TestGame::dealt(shifts(3), 8, 4)
     };
-    game.record(|_| v1::DecisionSource::Agent)
+    game.played()
 }
 
 fn start(lines: &mut [v1::RecordLine]) -> &mut v1::GameStart {

@@ -43,10 +43,8 @@ impl Referee {
         instead: Option<&Report>,
         ruling: &mut Ruling,
     ) -> Judged {
-        let before = self.clone();
-        let judged = self.correct_unless_refused(number, seat, instead, ruling);
+        let judged = self.or_undo(|it| it.correct_unless_refused(number, seat, instead, ruling));
         if judged.is_err() {
-            *self = before;
             ruling.corrected = None;
         }
         judged

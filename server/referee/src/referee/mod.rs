@@ -202,6 +202,16 @@ impl Referee {
         }
     }
 
+    /// Changes the game; if that is refused, everything stays as it was.
+    fn or_undo<T, E>(&mut self, change: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<T, E> {
+        let before = self.clone();
+        let changed = change(self);
+        if changed.is_err() {
+            *self = before;
+        }
+        changed
+    }
+
     fn judge(&mut self, number: u64, report: &Report, ruling: &mut Ruling) -> Verdict {
         if self.game().is_over() && !self.counts_after_the_end(report) {
             return Verdict::Known;

@@ -103,7 +103,7 @@ impl Referee {
                 if let Some(leader) = self.may_be_repeated(seat, action) {
                     return Ok(self.ask_if_again(number, report, leader));
                 }
-                self.act(number, report, seat, action, golden)
+                self.or_undo(|it| it.act(number, report, seat, action, golden))
             }
             TurnReport::Cleared => self.clear(number, report),
         }
@@ -212,22 +212,6 @@ impl Referee {
 
     /// Judges what a seat at the table did.
     fn act(
-        &mut self,
-        number: u64,
-        report: &Report,
-        seat: Option<Seat>,
-        action: Action,
-        golden: Option<bool>,
-    ) -> Judged {
-        let before = self.clone();
-        let judged = self.act_unless_refused(number, report, seat, action, golden);
-        if judged.is_err() {
-            *self = before;
-        }
-        judged
-    }
-
-    fn act_unless_refused(
         &mut self,
         number: u64,
         report: &Report,
@@ -626,10 +610,8 @@ impl Referee {
         };
         match (asked.doubt, option) {
             (Doubt::Passed(missed, _), Some(0)) => {
-                let before = self.clone();
-                if self.insert_passes(number, &missed).is_err() {
-                    *self = before;
-                }
+                // If they do not fit, nothing changes.
+                let _ = self.or_undo(|it| it.insert_passes(number, &missed));
                 self.judge_held(ruling);
             }
             (Doubt::Passed(_, instead), Some(option @ 2..)) => {

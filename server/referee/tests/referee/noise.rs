@@ -1,6 +1,6 @@
 //! Whole games, reported correctly or with reports that are missing, doubled or misread.
 
-use chefshat_engine::{Action, Seat};
+use chefshat_engine::{Action, Seat, Viewer};
 use chefshat_referee::{Question, Report, Stage, Verdict};
 use proptest::prelude::*;
 
@@ -45,15 +45,8 @@ fn play_correctly(table: &mut Table, confirm: bool) {
             verdict = table.report(&yes(question.id)).1;
         }
         assert_eq!(verdict, Verdict::Accepted, "{report:?}");
-        if table.rng.random_bool(0.2)
-            && table
-                .referee
-                .game()
-                .observe(chefshat_engine::Viewer::Spectator)
-                .board
-                .size
-                == 0
-        {
+        let board = table.referee.game().observe(Viewer::Spectator).board;
+        if table.rng.random_bool(0.2) && board.size == 0 {
             let (_, verdict) = table.report(&Report::Cleared);
             assert_eq!(verdict, Verdict::Known);
         }
@@ -79,14 +72,17 @@ fn yes(question: String) -> Report {
     }
 }
 
+/// The first turn that counts although it is not what happened.
+fn first_wrong(counted: &[(u64, Seat, Action)], truth: &[(Seat, Action)]) -> Option<usize> {
+    (counted.iter().zip(truth)).position(|((_, seat, action), right)| (*seat, *action) != *right)
+}
+
 /// The answer to whether seats passed, of an attendant who saw everything: yes, no, or that instead
 /// somebody had passed before a play that counts for the wrong seat.
 fn passed(table: &Table, question: &Question) -> usize {
     let counted = table.counted();
     let truth = table.true_turns();
-    let wrong = (counted.iter().zip(truth))
-        .position(|((_, seat, action), right)| (*seat, *action) != *right);
-    if let Some(index) = wrong {
+    if let Some(index) = first_wrong(&counted, truth) {
         let (_, seat, action) = counted[index];
         let is_explained = truth[index] == (seat, Action::Pass)
             && truth
@@ -131,11 +127,7 @@ fn attend(table: &mut Table) {
         }
         let counted = table.counted();
         let truth = table.true_turns().to_vec();
-        let wrong = counted
-            .iter()
-            .zip(&truth)
-            .position(|((_, seat, action), right)| (*seat, *action) != *right);
-        if let Some(index) = wrong {
+        if let Some(index) = first_wrong(&counted, &truth) {
             let (number, seat, _) = counted[index];
             let (right, action) = truth[index];
             let inferred = counted.get(index + 1).is_some_and(|next| next.0 == number);
@@ -275,23 +267,17 @@ fn play(table: &mut Table, mut report_turn: impl FnMut(&mut Table, &Report)) {
                 continue;
             }
         }
-        let pizza_before = table
-            .truth
-            .observe(chefshat_engine::Viewer::Spectator)
-            .pizza;
+        let pizza = |table: &Table| table.truth.observe(Viewer::Spectator).pizza;
+        let pizza_before = pizza(table);
         let (seat, _, report) = table.turn();
         if table.remote[seat] {
             continue;
         }
         report_turn(table, &report);
         // A correction is possible within the pizza: the attendant looks before it is cleared.
-        let pizza = table
-            .truth
-            .observe(chefshat_engine::Viewer::Spectator)
-            .pizza;
         let other_shift =
             table.referee.game().shift() != table.truth.shift() || table.referee.game().is_over();
-        if pizza != pizza_before
+        if pizza(table) != pizza_before
             || table.turns.is_empty()
             || other_shift
             || table.rng.random_bool(0.5)
@@ -301,16 +287,18 @@ fn play(table: &mut Table, mut report_turn: impl FnMut(&mut Table, &Report)) {
     }
 }
 
+/// Seeds, remote seats, numbers of faces and variations of the rules.
+fn games() -> impl Strategy<Value = (u64, u8, u8, u8)> {
+    (any::<u64>(), 0..15u8, 5..=11u8, 0..16u8)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     /// No legal physical game is called a violation, and its record is the truth.
     #[test]
     fn correct_reports_give_the_game_itself(
-        seed in any::<u64>(),
-        remote in 0u8..15,
-        faces in 5u8..=11,
-        variation in 0u8..16,
+        (seed, remote, faces, variation) in games(),
         confirm in any::<bool>(),
     ) {
         let mut table = Table::new(varied(faces, 3, variation), seed, remote);
@@ -326,10 +314,7 @@ proptest! {
     /// the end is the truth.
     #[test]
     fn noisy_reports_give_the_game_after_questions_and_corrections(
-        seed in any::<u64>(),
-        remote in 0u8..15,
-        faces in 5u8..=11,
-        variation in 0u8..16,
+        (seed, remote, faces, variation) in games(),
         noise in 0.0..0.5,
     ) {
         let mut table = Table::new(varied(faces, 2, variation), seed, remote);
@@ -340,28 +325,18 @@ proptest! {
     /// Missing passes are never guessed wrong, whether an attendant looks or not.
     #[test]
     fn missing_passes_are_inferred_or_asked_for(
-        seed in any::<u64>(),
-        remote in 0u8..15,
-        faces in 5u8..=11,
-        variation in 0u8..16,
+        (seed, remote, faces, variation) in games(),
         missing in 0.0..1.0,
     ) {
         let mut table = Table::new(varied(faces, 2, variation), seed, remote);
         play_with_missing_passes(&mut table, missing);
         table.check_end();
     }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     /// Plays that count for the wrong seat after a forgotten pass are noticed or corrected.
     #[test]
     fn plays_without_a_seat_are_brought_to_theirs(
-        seed in any::<u64>(),
-        remote in 0u8..15,
-        faces in 5u8..=11,
-        variation in 0u8..16,
+        (seed, remote, faces, variation) in games(),
         missing in 0.0..0.7,
     ) {
         let mut table = Table::new(varied(faces, 2, variation), seed, remote);

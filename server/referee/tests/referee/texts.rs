@@ -20,10 +20,20 @@ fn cards(faces: &[usize], golden: Option<bool>) -> SeenCards {
     SeenCards { counts, golden }
 }
 
+/// A hand without jokers.
+const HAND: [usize; 17] = [4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10];
+
 fn laid(seat: usize, faces: &[usize]) -> Report {
     Report::Laid {
         seat: Some(Seat::new(seat)),
         cards: cards(faces, None),
+    }
+}
+
+fn hand(seat: usize, faces: &[usize], golden: Option<bool>) -> Report {
+    Report::Hand {
+        seat: Seat::new(seat),
+        cards: cards(faces, golden),
     }
 }
 
@@ -70,6 +80,19 @@ impl Evening {
                     .clone()
             }
         }
+    }
+
+    /// The seats of the reports that count.
+    fn seats(&self) -> Vec<Seat> {
+        let seats = self.referee.accepted().map(|it| it.report.seat());
+        seats.map(Option::unwrap).collect()
+    }
+
+    /// Answers the first question.
+    fn answer(&mut self, option: usize) {
+        let id = self.referee.questions()[0].id.clone();
+        let option = Some(option);
+        self.check(&[(Report::Answer { id, option }, "accepted")]);
     }
 
     fn check(&mut self, table: &[(Report, &str)]) {
@@ -145,15 +168,8 @@ fn a_missed_pass_is_asked_for() {
     assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
     // The pizza was cleared, but two passes are missing.
     evening.check(&[(Report::Cleared, "Did Ada and Cy pass?")]);
-    let id = evening.referee.questions()[0].id.clone();
+    evening.answer(1);
     evening.check(&[
-        (
-            Report::Answer {
-                id,
-                option: Some(1),
-            },
-            "accepted",
-        ),
         (pass(0), "accepted"),
         (Report::PassWithdrawn { seat: Seat::new(0) }, "accepted"),
         (Report::PassWithdrawn { seat: Seat::new(0) }, "known"),
@@ -195,20 +211,12 @@ fn a_play_without_a_seat_may_be_of_the_one_after_who_passed_unseen() {
             "No, Bo passed before 9"
         ]
     );
-    evening.number += 1;
-    let answer = Report::Answer {
-        id: question.id,
-        option: Some(3),
-    };
-    let ruling = evening.referee.report(evening.number, &answer);
+    let (id, option) = (question.id, Some(3));
+    let ruling = (evening.referee).report(9, &Report::Answer { id, option });
     let corrected = ruling.corrected.unwrap();
     assert_eq!(corrected.text, "No, Bo passed before 9");
     assert!(corrected.void_reports.is_empty());
-    let counted = evening
-        .referee
-        .accepted()
-        .map(|it| it.report.seat().unwrap());
-    assert_eq!(counted.collect::<Vec<_>>(), [0, 1, 2, 3, 0].map(Seat::new));
+    assert_eq!(evening.seats(), [0, 1, 2, 3, 0].map(Seat::new));
     assert_eq!(evening.referee.waiting_for(), "It is Cy's turn.");
 }
 
@@ -227,46 +235,21 @@ fn a_play_without_a_seat_is_moved_by_a_correction_and_those_after_it_follow() {
             "Did Bo pass?",
         ),
     ]);
-    let id = evening.referee.questions()[0].id.clone();
-    evening.check(&[(
-        Report::Answer {
-            id,
-            option: Some(0),
-        },
-        "accepted",
-    )]);
-    let counted = evening
-        .referee
-        .accepted()
-        .map(|it| it.report.seat().unwrap());
-    assert_eq!(counted.collect::<Vec<_>>(), [0, 1, 2, 3].map(Seat::new));
+    evening.answer(0);
+    assert_eq!(evening.seats(), [0, 1, 2, 3].map(Seat::new));
 }
 
 #[test]
 fn a_play_that_the_awaited_seat_cannot_have_is_asked_about() {
     let mut evening = Evening::new();
-    let hand = cards(
-        &[5, 6, 6, 7, 7, 7, 8, 8, 8, 8, 9, 9, 9, 9, 10, 10, 10],
-        None,
-    );
-    let hand = Report::Hand {
-        seat: Seat::new(1),
-        cards: hand,
-    };
+    let faces = [5, 6, 6, 7, 7, 7, 8, 8, 8, 8, 9, 9, 9, 9, 10, 10, 10];
     evening.check(&[
-        (hand, "accepted"),
+        (hand(1, &faces, None), "accepted"),
         (laid(0, &[11, 11]), "accepted"),
         // Bo has none.
         (somebody(&[4, 4]), "Did Bo pass?"),
     ]);
-    let id = evening.referee.questions()[0].id.clone();
-    evening.check(&[(
-        Report::Answer {
-            id,
-            option: Some(0),
-        },
-        "accepted",
-    )]);
+    evening.answer(0);
     assert_eq!(evening.referee.waiting_for(), "It is Di's turn.");
 }
 
@@ -340,25 +323,15 @@ fn a_play_of_an_earlier_pizza_can_be_corrected() {
 #[test]
 fn a_remote_seat_decides_before_the_board_is_cleared() {
     let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(3)));
-    let hand = cards(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10], None);
+    let hand = hand(3, &HAND, None);
     evening.check(&[
-        (
-            Report::Hand {
-                seat: Seat::new(3),
-                cards: hand,
-            },
-            "accepted",
-        ),
+        (hand.clone(), "accepted"),
         (laid(0, &[11]), "accepted"),
         (pass(1), "accepted"),
         (pass(2), "accepted"),
     ]);
     evening.decide(3, "C10;Q1;J0");
     // The 10 is still among its cards.
-    let hand = Report::Hand {
-        seat: Seat::new(3),
-        cards: hand,
-    };
     evening.check(&[
         (hand.clone(), "known"),
         (laid(3, &[10]), "accepted"),
@@ -422,7 +395,7 @@ fn corrections_and_questions() {
         (Report::Pause(true), "accepted"),
         (Report::Pause(true), "known"),
         (
-            Report::Hand { seat: Seat::new(3), cards: cards(&[1, 2, 3], None) },
+            hand(3, &[1, 2, 3], None),
             "Di has 17 cards, but 3 are seen. Show all of them side by side.",
         ),
     ]);
@@ -456,15 +429,8 @@ fn what_came_after_a_corrected_end_of_the_game_is_void() {
 #[test]
 fn reports_without_a_seat_are_never_those_of_a_remote_seat() {
     let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(1)));
-    let hand = cards(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10], None);
     evening.check(&[
-        (
-            Report::Hand {
-                seat: Seat::new(1),
-                cards: hand,
-            },
-            "accepted",
-        ),
+        (hand(1, &HAND, None), "accepted"),
         (laid(0, &[11]), "accepted"),
         (
             Report::Pass { seat: None },
@@ -490,11 +456,7 @@ fn reports_without_a_seat_wait_for_the_answer_to_a_question() {
         (somebody(&[8]), "Did Bo pass?"),
     ]);
     let held = evening.number;
-    let hand = Report::Hand {
-        seat: Seat::new(1),
-        cards: cards(&[1], None),
-    };
-    let instead = Some(Box::new(hand));
+    let instead = Some(Box::new(hand(1, &[1], None)));
     let id = evening.referee.questions()[0].id.clone();
     evening.check(&[
         (
@@ -523,17 +485,8 @@ fn passes_of_one_answer_are_taken_back_one_by_one() {
         (laid(0, &[11]), "accepted"),
         (laid(3, &[9]), "Did Bo and Cy pass?"),
     ]);
-    let id = evening.referee.questions()[0].id.clone();
-    evening.check(&[
-        (
-            Report::Answer {
-                id,
-                option: Some(0),
-            },
-            "accepted",
-        ),
-        (Report::PassWithdrawn { seat: Seat::new(2) }, "accepted"),
-    ]);
+    evening.answer(0);
+    evening.check(&[(Report::PassWithdrawn { seat: Seat::new(2) }, "accepted")]);
     // Bo has passed; Di's cards wait again.
     assert_eq!(evening.referee.waiting_for(), "Did Cy pass?");
 }
@@ -541,10 +494,6 @@ fn passes_of_one_answer_are_taken_back_one_by_one() {
 #[test]
 fn the_golden_card_in_a_known_hand_is_in_no_other() {
     let mut evening = Evening::new();
-    let hand = |seat, faces: &[usize], golden| Report::Hand {
-        seat: Seat::new(seat),
-        cards: cards(faces, golden),
-    };
     let bo = [11, 3, 5, 5, 6, 6, 8, 8, 8, 9, 9, 9, 10, 10, 10, 10, 10];
     let ada = [11, 4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 9, 9, 9, 9, 10, 10];
     evening.check(&[

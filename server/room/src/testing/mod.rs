@@ -4,7 +4,7 @@
 mod chance;
 pub mod real_table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -30,6 +30,47 @@ pub fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
+/// The id with this number.
+pub const fn id<T>(number: u8) -> Id<T> {
+    Id::from_bytes([number; 16])
+}
+
+/// The header of a game with a known seed.
+pub fn header(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> GameHeader {
+    GameHeader {
+        room_id: id(1),
+        game_id: id(2),
+        name: "table".into(),
+        rules: rules.validate().expect("a valid rule set"),
+        rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
+        participant_removed: false,
+        policy,
+        display_names: BTreeMap::new(),
+        wizards: BTreeSet::new(),
+        recorded: BTreeMap::new(),
+        start: GameStart::default(),
+        fills,
+        seed: SeedPlan::Fixed { game_seed: [7; 32] },
+        created_at_ms: 0,
+        join_code: "CODE".into(),
+        owner: SecretHash::of(b"owner"),
+        tournament: None,
+        table: None,
+        study: None,
+    }
+}
+
+/// A participant without a key.
+pub fn participant(name: &str, kind: ParticipantKind) -> SeatedParticipant {
+    SeatedParticipant {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind,
+        ticket: SecretHash::of(b"ticket"),
+    }
+}
+
 /// A room under test: the core, a clock, and the journal of committed changes.
 pub struct Table {
     pub core: Core,
@@ -47,30 +88,8 @@ impl Table {
     }
 
     pub fn with_rules(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> Self {
-        let header = Arc::new(GameHeader {
-            room_id: Id::from_bytes([1; 16]),
-            game_id: Id::from_bytes([2; 16]),
-            name: "table".into(),
-            rules: rules.validate().expect("a valid rule set"),
-            rules_version: RULES_VERSION,
-            server_version: String::new(),
-            participant_removed: false,
-            policy,
-            display_names: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            fills,
-            seed: SeedPlan::Fixed { game_seed: [7; 32] },
-            created_at_ms: 0,
-            join_code: "CODE".into(),
-            owner: SecretHash::of(b"owner"),
-            tournament: None,
-            table: None,
-            study: None,
-        });
         Self {
-            core: Core::new(header),
+            core: Core::new(Arc::new(header(policy, fills, rules))),
             now: Duration::ZERO,
             journal: Vec::new(),
             connections: 0,
@@ -86,15 +105,8 @@ impl Table {
         table.core = Core::new(Arc::new(header));
         for seat in table.core.all_seats() {
             if let Fill::AtTable(kind) = table.core.standing(seat).fill {
-                table.core.seat(
-                    seat,
-                    SeatedParticipant {
-                        name: format!("player {seat}"),
-                        name_fingerprint: String::new(),
-                        kind,
-                        ticket: SecretHash::of(b"nobody"),
-                    },
-                );
+                let player = participant(&format!("player {seat}"), kind);
+                table.core.seat(seat, player);
             }
         }
         table.core.begin_if_all_built_in(table.now);
@@ -136,27 +148,34 @@ impl Table {
         table
     }
 
+    /// Creates a room at the start of the second Shift, in which these seats hold the jokers.
+    pub fn with_jokers_at(policy: Policy, fills: Vec<Fill>, holders: [Seat; 2]) -> Self {
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, holders).expect("every seat has cards to swap");
+        let mut table = Self::scripted(policy, fills, rules, second_shift(hands));
+        table.fill();
+        table
+    }
+
     pub fn fill(&mut self) {
-        let seats: Vec<Seat> = self.core.all_seats().collect();
-        for _ in &seats {
-            let _ = self.join(ParticipantKind::Agent);
-        }
-        for seat in seats {
+        self.join_all(ParticipantKind::Agent);
+        self.attach_all();
+    }
+
+    /// Takes all free seats.
+    pub fn join_all(&mut self, kind: ParticipantKind) {
+        while self.join(kind).is_ok() {}
+    }
+
+    pub fn attach_all(&mut self) {
+        for seat in self.core.all_seats() {
             self.attach(seat);
         }
     }
 
     pub fn join(&mut self, kind: ParticipantKind) -> Result<Seat, JoinError> {
-        let joined = self.core.join(
-            self.now,
-            None,
-            SeatedParticipant {
-                name: "somebody".into(),
-                name_fingerprint: String::new(),
-                kind,
-                ticket: SecretHash::of(b"ticket"),
-            },
-        );
+        let joined = (self.core).join(self.now, None, participant("somebody", kind));
         self.commit();
         joined
     }
@@ -229,6 +248,13 @@ impl Table {
         seat
     }
 
+    /// Plays until a seat has to decide.
+    pub fn play_until(&mut self, seat: Seat) {
+        while self.open().0 != seat {
+            self.play_one();
+        }
+    }
+
     pub fn commit(&mut self) {
         self.journal.append(self.core.pending());
         self.now += std::mem::take(&mut self.store_takes);
@@ -244,6 +270,20 @@ impl Table {
                 _ => None,
             })
             .expect("a decision has been taken")
+    }
+
+    /// All decisions, with their seats.
+    pub fn decided(&self) -> Vec<(Seat, ActionId)> {
+        let decided = |entry: &Entry| match &entry.change {
+            Change::Decided(decided) => Some((decided.seat, decided.action)),
+            _ => None,
+        };
+        self.journal.iter().filter_map(decided).collect()
+    }
+
+    /// How often a substitute has taken a seat.
+    pub fn substituted(&self) -> usize {
+        self.happened(|event| matches!(event, RoomEvent::Substituted(_)))
     }
 
     pub fn happened(&self, wanted: impl Fn(&RoomEvent) -> bool) -> usize {
@@ -271,6 +311,11 @@ impl Table {
             self.core.open().map(|open| (open.decision, open.id))
         );
     }
+}
+
+/// The connection that a seat got when its table was filled.
+pub fn first_connection(seat: Seat) -> ConnectionId {
+    ConnectionId(seat.index() as u64 + 1)
 }
 
 /// The second Shift of a game, in which the seats were ranked by their numbers.
@@ -324,7 +369,7 @@ pub fn with_jokers_at(
 /// The game of a study whose participant has seat 0.
 pub fn study_game(labels: SeatLabels) -> StudyGame {
     StudyGame {
-        study: Id::from_bytes([9; 16]),
+        study: id(9),
         name: "study".into(),
         condition: "condition".into(),
         levels: [("factor".to_owned(), "level".to_owned())].into(),
@@ -350,8 +395,13 @@ pub fn study_member(number: u32, participant: &str, seat: usize) -> StudyMember 
 
 /// Rules for games of one Shift.
 pub fn one_shift() -> RuleSetSpec {
+    shifts(1)
+}
+
+/// Rules for games of a number of Shifts.
+pub fn shifts(count: u32) -> RuleSetSpec {
     RuleSetSpec {
-        stop: Stop::Shifts(1),
+        stop: Stop::Shifts(count),
         ..RuleSetSpec::default()
     }
 }

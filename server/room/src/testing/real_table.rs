@@ -3,15 +3,14 @@
 
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_engine::{
-    Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, RuleSet, RuleSetSpec, Seat, Seed,
-    Stop,
+    Action, ActionId, BySeat, Cards, DecisionKind, Event, Game, RuleSet, Seat, Seed,
 };
 use chefshat_referee::counts::{Counts, JOKER, index};
 use chefshat_referee::{Report, SeenCards, Stage};
 
-use super::{OPEN, Table, ms};
+use super::{OPEN, Table, ms, shifts};
 use crate::ReportVerdict;
-use crate::journal::{Change, Fill, ParticipantKind, Source};
+use crate::journal::{Fill, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
 
@@ -171,14 +170,6 @@ pub fn policy() -> Policy {
     }
 }
 
-/// Rules for games of a number of Shifts.
-pub fn shifts(count: u32) -> RuleSetSpec {
-    RuleSetSpec {
-        stop: Stop::Shifts(count),
-        ..RuleSetSpec::default()
-    }
-}
-
 /// A room with players at the table, a remote agent and a built-in agent, beside the truth.
 pub struct Mixed {
     pub table: Table,
@@ -231,17 +222,23 @@ impl Mixed {
     /// Applies the decisions of remote seats to the truth.
     pub fn follow(&mut self) {
         self.table.pass_time(ms(0));
-        let decided: Vec<ActionId> = (self.table.journal.iter())
-            .filter_map(|entry| match &entry.change {
-                Change::Decided(decided) => Some(decided.action),
-                _ => None,
-            })
-            .collect();
         let at_table = |seat: Seat| matches!(self.table.core.standing(seat).fill, Fill::AtTable(_));
         let known = (self.real.decisions.iter()).filter(|(seat, _)| !at_table(*seat));
-        for action in decided.into_iter().skip(known.count()) {
+        for (_, action) in self.table.decided().into_iter().skip(known.count()) {
             self.real.decide(action);
         }
+    }
+
+    /// Plays to the end of the game at the table.
+    pub fn finish(&mut self) {
+        self.until(|it| it.table.core.state().is_over());
+        self.assert_same_end();
+    }
+
+    /// The game is over as it is at the table.
+    pub fn assert_same_end(&self) {
+        let standings = self.table.core.game().expect("a game").standings();
+        assert_eq!(standings, self.real.truth.standings());
     }
 
     pub fn until(&mut self, done: impl Fn(&Self) -> bool) {

@@ -2,13 +2,12 @@
 //! substitutes, and whom everybody sees awaited.
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::RuleSetSpec;
 use proptest::prelude::*;
 
 use super::*;
 use crate::journal::AbortReason;
 use crate::policy::AbortPolicy;
-use crate::testing::{dealt, second_shift};
+use crate::testing::first_connection;
 use crate::{Awaited, RECALL_TIME};
 
 const SEATS: usize = 4;
@@ -22,23 +21,8 @@ fn policy() -> Policy {
     }
 }
 
-/// The connection that a seat got when the table was filled.
-fn first_connection(seat: Seat) -> ConnectionId {
-    ConnectionId(u64::try_from(seat.index()).expect("small") + 1)
-}
-
 fn lose(table: &mut Table, seat: Seat) {
     table.lost(seat, first_connection(seat));
-}
-
-fn play_until(table: &mut Table, seat: Seat) {
-    while table.open().0 != seat {
-        table.play_one();
-    }
-}
-
-fn substituted(table: &Table) -> usize {
-    table.happened(|event| matches!(event, RoomEvent::Substituted(_)))
 }
 
 #[test]
@@ -54,14 +38,14 @@ fn a_seat_that_is_away_is_substituted_when_its_absence_time_is_over() {
     let decided = table.last_decision();
     assert_eq!((decided.seat, decided.source), (seat, Source::Disconnected));
     assert_eq!((decided.time_us, decided.bank_left_ms), (700_000, 500));
-    assert_eq!(substituted(&table), 1, "at once, not after max_timeouts");
+    assert_eq!(table.substituted(), 1, "at once, not after max_timeouts");
     // The substitute plays until the seat returns.
     for _ in 0..6 {
         assert_ne!(table.play_one(), seat);
     }
     table.attach(seat);
     assert!(!table.core.standing(seat).substituted);
-    play_until(&mut table, seat);
+    table.play_until(seat);
     table.play_one();
     assert_eq!(table.last_decision().source, Source::Agent);
     assert_eq!(table.last_decision().bank_left_ms, 500);
@@ -75,7 +59,7 @@ fn the_absence_time_runs_from_the_start_of_a_decision_at_the_earliest() {
     let seat = Seat::new((first.index() + 1) % SEATS);
     lose(&mut table, seat);
     table.pass_time(ms(600));
-    play_until(&mut table, seat);
+    table.play_until(seat);
     assert_eq!(table.core.deadline(), Some(table.now + ms(400)));
     table.pass_time(ms(400));
     assert_eq!(table.last_decision().source, Source::Disconnected);
@@ -126,7 +110,7 @@ fn absences_during_one_decision_share_the_absence_time() {
     assert_eq!(table.open(), (seat, id), "a millisecond is left");
     table.pass_time(ms(1));
     assert_eq!(table.last_decision().source, Source::Disconnected);
-    assert_eq!(substituted(&table), 1);
+    assert_eq!(table.substituted(), 1);
 }
 
 #[test]
@@ -180,7 +164,7 @@ fn a_connection_lost_just_before_the_end_of_a_decision_costs_the_decision_alone(
     assert_eq!(table.last_decision().source, Source::Disconnected);
     assert_eq!(table.core.state(), State::Playing);
     // It is still away at its next decision.
-    play_until(&mut table, seat);
+    table.play_until(seat);
     table.pass_time(ms(399));
     assert_eq!(table.core.state(), State::Playing);
     table.pass_time(ms(1));
@@ -200,25 +184,16 @@ fn the_policy_may_abort_the_game_instead() {
     table.pass_time(ms(400));
     let reason = AbortReason::ParticipantsLost;
     assert_eq!(table.core.state(), State::Aborted(reason));
-    assert_eq!(substituted(&table), 0);
+    assert_eq!(table.substituted(), 0);
     table.assert_replays();
 }
 
 #[test]
 fn a_special_action_ends_as_if_its_seat_were_connected() {
-    let rules = RuleSetSpec::default();
-    let valid = rules.validate().expect("a valid rule set");
     let holder = Seat::new(2);
-    let hands = dealt(&valid, 3, [holder; 2]).expect("every seat has cards to swap");
     let mut shown = Vec::new();
     for away in [false, true] {
-        let mut table = Table::scripted(
-            policy(),
-            vec![OPEN; SEATS],
-            rules.clone(),
-            second_shift(hands),
-        );
-        table.fill();
+        let mut table = Table::with_jokers_at(policy(), vec![OPEN; SEATS], [holder; 2]);
         assert_eq!(table.open().0, holder);
         let awaited = table.core.awaited_in_public().expect("somebody is awaited");
         assert_ne!(awaited.seat, holder, "nobody may know of its decision");
@@ -231,7 +206,7 @@ fn a_special_action_ends_as_if_its_seat_were_connected() {
         assert_eq!(table.core.decisions(), 0);
         table.pass_time(ms(1));
         assert_eq!(table.last_decision().seat, holder);
-        assert_eq!(substituted(&table), 0);
+        assert_eq!(table.substituted(), 0);
         let next = table.core.awaited_in_public();
         assert_eq!(next, Some(awaited), "the decision that follows was shown");
         assert_eq!((awaited.since, awaited.until), (ms(0), None));
@@ -314,7 +289,7 @@ fn the_absence_time_runs_after_the_time_to_return_from_a_restart() {
     assert_eq!(table.open(), (seat, id), "a millisecond is left");
     table.pass_time(ms(1));
     assert_eq!(table.last_decision().source, Source::Disconnected);
-    assert_eq!(substituted(&table), 1);
+    assert_eq!(table.substituted(), 1);
     table.assert_replays();
 }
 
@@ -331,7 +306,7 @@ fn games_of_earlier_servers_do_not_mind_absences() {
     table.pass_time(ms(1));
     assert_eq!(table.last_decision().source, Source::Disconnected);
     assert_eq!(table.last_decision().bank_left_ms, 0);
-    assert_eq!(substituted(&table), 0);
+    assert_eq!(table.substituted(), 0);
 }
 
 /// What happens next at the table of a random game.

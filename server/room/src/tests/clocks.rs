@@ -6,6 +6,7 @@ use chefshat_engine::Event;
 use super::*;
 use crate::journal::AbortReason;
 use crate::policy::{AbortPolicy, KindClock};
+use crate::testing::first_connection;
 
 fn quick() -> Policy {
     Policy {
@@ -46,9 +47,7 @@ fn the_bank_pays_for_time_beyond_the_decision_time() {
     assert_eq!(answered.time, ms(1200));
     assert_eq!(table.last_decision().bank_left_ms, 300);
     // Its next decision has 1000 + 300 milliseconds.
-    while table.open().0 != seat {
-        table.play_one();
-    }
+    table.play_until(seat);
     table.pass_time(ms(1300));
     assert_eq!(table.last_decision().seat, seat);
     assert_eq!(table.last_decision().source, Source::Timeout);
@@ -219,9 +218,7 @@ fn a_silent_seat_is_substituted_and_can_return() {
     table.core.resume(table.now, silent);
     table.commit();
     assert!(!table.core.standing(silent).substituted);
-    while table.open().0 != silent {
-        table.play_one();
-    }
+    table.play_until(silent);
     table.play_one();
     assert_eq!(table.last_decision().source, Source::Agent);
     table.assert_replays();
@@ -239,9 +236,7 @@ fn a_seat_that_attaches_again_plays_for_itself() {
     let (seat, _) = table.open();
     table.pass_time(ms(1000));
     assert!(table.core.standing(seat).substituted);
-    while table.open().0 != seat {
-        table.play_one();
-    }
+    table.play_until(seat);
     // The substitute waits for its pace; the agent returns first and gets the decision with a new
     // clock.
     table.pass_time(ms(300));
@@ -257,9 +252,8 @@ fn a_seat_that_attaches_again_plays_for_itself() {
 fn a_lost_connection_does_not_stop_the_clock_and_has_its_own_source() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
-    let connection = ConnectionId(u64::try_from(seat.index()).expect("small") + 1);
     table.pass_time(ms(400));
-    table.lost(seat, connection);
+    table.lost(seat, first_connection(seat));
     assert_eq!(
         table.happened(|event| matches!(event, RoomEvent::Disconnected { .. })),
         1
@@ -297,7 +291,7 @@ fn a_game_without_participants_is_aborted_as_the_policy_says() {
             ..quick()
         });
         table.pass_time(Duration::from_secs(3600));
-        let substituted = table.happened(|event| matches!(event, RoomEvent::Substituted(_)));
+        let substituted = table.substituted();
         match lost_seats {
             Some(lost) => {
                 assert_eq!(
@@ -366,12 +360,8 @@ fn kinds_of_participants_can_have_separate_clocks() {
         (ParticipantKind::Robot, 1500, 250),
     ] {
         let mut table = Table::empty(policy.clone(), vec![OPEN; 4]);
-        for _ in 0..4 {
-            table.join(kind).expect("a seat is free");
-        }
-        for seat in table.core.all_seats() {
-            table.attach(seat);
-        }
+        table.join_all(kind);
+        table.attach_all();
         let (seat, id) = table.open();
         table.pass_time(ms(allowed - bank_after));
         let action = table.legal(0);
@@ -428,21 +418,13 @@ fn an_answer_is_closed_only_if_its_decision_is() {
     let (wrong, right) = (table.illegal(), table.legal(0));
     let core = &mut table.core;
     // Both were read before the room responded: one in time, one after the deadline.
-    let first = core.answer(
-        ms(1600),
-        seat,
-        Answer::new(id, wrong),
-        ms(1400),
-        Some(ms(0)),
-    );
+    let mut answer = |action, arrived| {
+        let answer = Answer::new(id, action);
+        core.answer(ms(1600), seat, answer, arrived, Some(ms(0)))
+    };
+    let first = answer(wrong, ms(1400));
     assert!(matches!(first.verdict, Verdict::Invalid { .. }));
-    let second = core.answer(
-        ms(1600),
-        seat,
-        Answer::new(id, right),
-        ms(1550),
-        Some(ms(0)),
-    );
+    let second = answer(right, ms(1550));
     assert_eq!(second.verdict, Verdict::Accepted, "the clock was paused");
     assert!(
         core.open()
@@ -460,14 +442,12 @@ fn attaching_again_does_not_forgive_timeouts() {
     });
     let seat = table.open().0;
     let connection = |table: &Table, seat: Seat| match table.connections {
-        4 => ConnectionId(u64::try_from(seat.index()).expect("small") + 1),
+        4 => first_connection(seat),
         last => ConnectionId(last),
     };
     // It crashes whenever it is asked, and attaches again when its time is up.
     for crash in 1..=3 {
-        while table.open().0 != seat {
-            table.play_one();
-        }
+        table.play_until(seat);
         assert!(!table.core.standing(seat).substituted, "crash {crash}");
         let lost = connection(&table, seat);
         table.lost(seat, lost);
@@ -480,14 +460,10 @@ fn attaching_again_does_not_forgive_timeouts() {
     // It gets its seat back, but loses it at the next timeout, unless it answers in time.
     for answers in [false, true] {
         table.attach(seat);
-        while table.open().0 != seat {
-            table.play_one();
-        }
+        table.play_until(seat);
         if answers {
             table.play_one();
-            while table.open().0 != seat {
-                table.play_one();
-            }
+            table.play_until(seat);
         }
         table.pass_time(ms(1000));
         assert_eq!(table.core.standing(seat).substituted, !answers);
@@ -510,9 +486,7 @@ fn invalid_answers_do_not_forgive_timeouts() {
     // timeout.
     for attempts in [2, 1] {
         assert!(!table.core.standing(seat).substituted);
-        while table.open().0 != seat {
-            table.play_one();
-        }
+        table.play_until(seat);
         let id = table.open().1;
         for _ in 0..attempts {
             let wrong = table.illegal();

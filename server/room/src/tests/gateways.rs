@@ -1,10 +1,8 @@
 //! Seats whose clients are connected to another server, which measures the time of their answers.
 
-use chefshat_engine::RuleSetSpec;
-
 use super::*;
 use crate::log::RoomEvent;
-use crate::testing::{dealt, second_shift};
+use crate::testing::first_connection;
 use crate::{Answered, MAX_GATEWAY_DELAY, RECALL_TIME};
 
 /// A game in which the seats' answers are measured elsewhere; each has 1.5 s for a decision.
@@ -88,14 +86,9 @@ fn the_deadline_waits_for_answers_that_may_be_on_their_way() {
     table.assert_replays();
 }
 
-/// The connection of a seat of a table that was filled once.
-fn connection(seat: Seat) -> ConnectionId {
-    ConnectionId(seat.index() as u64 + 1)
-}
-
 /// Loses the server through which a seat is connected.
 fn lose_server(table: &mut Table, seat: Seat) {
-    (table.core).lost_with_node(table.now, seat, connection(seat), None);
+    (table.core).lost_with_node(table.now, seat, first_connection(seat), None);
     table.commit();
 }
 
@@ -154,15 +147,11 @@ fn a_seat_whose_server_is_lost_and_that_stays_away_is_substituted_as_usual() {
 #[test]
 fn a_silent_decision_ends_at_the_same_time_whoever_decides_and_is_lost() {
     let ended = |measured: Seat, loses_server: bool| {
-        let rules = RuleSetSpec::default();
-        let valid = rules.validate().expect("a valid rule set");
-        let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
         let policy = Policy {
             decision_time: ms(1000),
             ..Policy::default()
         };
-        let mut table = Table::scripted(policy, vec![OPEN; 4], rules, second_shift(hands));
-        table.fill();
+        let mut table = Table::with_jokers_at(policy, vec![OPEN; 4], [Seat::new(2); 2]);
         let (seat, _) = table.open();
         assert!(table.core.awaited().expect("the holder").is_silent());
         // Of the seats, one or another is connected through a server.
@@ -170,7 +159,7 @@ fn a_silent_decision_ends_at_the_same_time_whoever_decides_and_is_lost() {
         table.pass_time(ms(400));
         match loses_server {
             true => lose_server(&mut table, seat),
-            false => table.lost(seat, connection(seat)),
+            false => table.lost(seat, first_connection(seat)),
         }
         table.attach(seat);
         table.pass_time(ms(599) + MAX_GATEWAY_DELAY);
@@ -200,7 +189,7 @@ fn a_seat_that_was_lost_with_its_server_and_is_away_at_the_end_has_forfeited() {
 fn earlier_absences_do_not_shorten_the_time_after_a_server_is_lost() {
     let mut table = measured();
     let (seat, _) = table.open();
-    table.lost(seat, connection(seat));
+    table.lost(seat, first_connection(seat));
     table.pass_time(ms(800));
     let again = table.attach(seat);
     table.core.lost_with_node(table.now, seat, again, None);

@@ -16,8 +16,7 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 
 use super::{Answer, ConnectionId, Core, State, Verdict};
-use crate::ids::SecretHash;
-use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
+use crate::journal::{Change, Fill, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
-use crate::testing::{OPEN, Table, ms, one_shift};
+use crate::testing::{OPEN, Table, ms, one_shift, participant};

@@ -3,34 +3,49 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::{DecisionKind, Event, Seat};
+use chefshat_engine::{DecisionKind, Event, Seat, Viewer};
 use chefshat_referee::{MAX_QUESTIONS, Question, Refusal, Stage, ViolatedRule};
 
 use super::{Core, OPEN, ParticipantKind, Source, State, Table, ms};
 use crate::journal::{AbortReason, Report, ReportSource, Reported};
 use crate::log::RoomEvent;
-use crate::testing::real_table::{MIXED, Mixed, PERSON, policy, shifts};
+use crate::testing::real_table::{MIXED, Mixed, PERSON, policy};
+use crate::testing::shifts;
 use crate::{CONFIRMATION_TIME, MAX_IDLE, MAX_REPORTS, ReportError, ReportVerdict};
+
+/// A report with an id.
+fn reported(id: &str, report: Report) -> Reported {
+    Reported {
+        id: id.into(),
+        source: ReportSource::Attendant,
+        age: Duration::ZERO,
+        report,
+    }
+}
+
+/// A question that a camera asks.
+fn question(id: String) -> Report {
+    Report::Question(Question {
+        id,
+        text: "7 or 9 at place 4?".into(),
+        options: vec!["7".into(), "9".into()],
+        seat: None,
+    })
+}
 
 #[test]
 fn a_mixed_game_is_the_one_at_the_table() {
     for seed in 0..6 {
         let mut mixed = Mixed::new(MIXED, 2, seed);
-        mixed.until(|it| it.table.core.state().is_over());
+        mixed.finish();
         assert_eq!(mixed.table.core.state(), State::Finished);
-        let game = mixed.table.core.game().expect("it started");
-        assert_eq!(game.standings(), mixed.real.truth.standings());
         mixed.table.assert_replays();
         let sources = mixed.sources();
         for source in [Source::Table, Source::Agent] {
             assert!(sources.iter().any(|(it, _)| *it == source));
         }
-        assert_eq!(
-            mixed
-                .table
-                .happened(|it| matches!(it, RoomEvent::Violation(_))),
-            0
-        );
+        let violations = |it: &RoomEvent| matches!(it, RoomEvent::Violation(_));
+        assert_eq!(mixed.table.happened(violations), 0);
     }
 }
 
@@ -39,12 +54,7 @@ fn players_at_the_table_are_present_and_nobody_can_join_for_them() {
     let mut table = Table::physical(policy(), vec![PERSON, PERSON, OPEN, PERSON], shifts(1));
     assert_eq!(table.core.state(), State::Waiting);
     assert_eq!(table.happened(|it| matches!(it, RoomEvent::Seated(..))), 3);
-    let early = Reported {
-        id: "a".into(),
-        source: ReportSource::Camera,
-        age: Duration::ZERO,
-        report: Report::Cleared,
-    };
+    let early = reported("a", Report::Cleared);
     let refused = table.core.report(table.now, early);
     assert_eq!(refused, Err(ReportError::GameNotStarted));
     // They keep their seats, however long the others take.
@@ -63,9 +73,7 @@ fn all_at_the_table_start_at_once_and_no_clock_runs() {
     assert_eq!(mixed.table.core.state(), State::Playing);
     assert_eq!(mixed.table.core.deadline(), Some(MAX_IDLE));
     assert!(mixed.table.core.open().is_none());
-    mixed.until(|it| it.table.core.state().is_over());
-    let standings = mixed.table.core.game().expect("a game").standings();
-    assert_eq!(standings, mixed.real.truth.standings());
+    mixed.finish();
 }
 
 /// A game at the table whose last play has been reported.
@@ -89,20 +97,14 @@ fn the_play_that_ends_a_game_can_be_corrected_until_its_end_is_confirmed() {
         mixed.stage()
     );
     let refused = Err(ReportError::Refused(Refusal::NotOver));
-    let confirm = |id: &str| Reported {
-        id: id.into(),
-        source: ReportSource::Attendant,
-        age: Duration::ZERO,
-        report: Report::EndConfirmed,
-    };
+    let confirm = |id: &str| reported(id, Report::EndConfirmed);
     let now = mixed.table.now;
     assert_eq!(mixed.table.core.report(now, confirm("early")), refused);
     mixed.table.report(last.report);
     assert_eq!(mixed.stage(), Stage::Confirmation);
     mixed.table.report(Report::EndConfirmed);
     assert_eq!(mixed.table.core.state(), State::Finished);
-    let standings = mixed.table.core.game().expect("a game").standings();
-    assert_eq!(standings, mixed.real.truth.standings());
+    mixed.assert_same_end();
     let late = mixed.table.core.report(now, confirm("late"));
     assert_eq!(late, Err(ReportError::GameOver));
     mixed.table.assert_replays();
@@ -136,27 +138,17 @@ fn a_remote_seat_decides_only_when_its_hand_is_known() {
     let mut mixed = Mixed::new(MIXED, 1, 1);
     assert_eq!(mixed.stage(), Stage::Hand(Seat::new(1)));
     assert!(mixed.table.core.open().is_none());
-    let observed = mixed
-        .table
-        .core
-        .observe(chefshat_engine::Viewer::Seat(Seat::new(1)));
-    assert!(observed.expect("a game").hand.is_empty(), "an assumed hand");
-    let report = mixed.real.hand(Seat::new(1));
+    let seat = Seat::new(1);
+    let hand = |table: &Table| {
+        let observed = table.core.observe(Viewer::Seat(seat));
+        observed.expect("a game").hand
+    };
+    assert!(hand(&mixed.table).is_empty(), "an assumed hand");
+    let report = mixed.real.hand(seat);
     mixed.table.report(report);
-    let observed = mixed
-        .table
-        .core
-        .observe(chefshat_engine::Viewer::Seat(Seat::new(1)));
-    assert_eq!(
-        observed.expect("a game").hand,
-        mixed.real.truth.hands()[Seat::new(1)]
-    );
-    assert_eq!(
-        mixed
-            .table
-            .happened(|it| matches!(it, RoomEvent::HandReported(_))),
-        1
-    );
+    assert_eq!(hand(&mixed.table), mixed.real.truth.hands()[seat]);
+    let hands = |it: &RoomEvent| matches!(it, RoomEvent::HandReported(_));
+    assert_eq!(mixed.table.happened(hands), 1);
 }
 
 #[test]
@@ -164,12 +156,7 @@ fn a_repeated_report_gets_the_same_ruling_and_changes_nothing() {
     let mut mixed = Mixed::new([PERSON; 4], 1, 2);
     let stage = mixed.stage();
     let report = mixed.real.next_report(stage).expect("the opening");
-    let reported = Reported {
-        id: "once".into(),
-        source: ReportSource::Attendant,
-        age: Duration::ZERO,
-        report,
-    };
+    let reported = reported("once", report);
     let now = mixed.table.now;
     let first = mixed.table.core.report(now, reported.clone());
     mixed.table.commit();
@@ -234,12 +221,8 @@ fn a_pause_stops_the_clock_and_gives_the_full_time_again() {
             if decided.seat == seat && decided.source == Source::Timeout)
     });
     assert!(timed_out);
-    assert_eq!(
-        mixed
-            .table
-            .happened(|it| matches!(it, RoomEvent::Paused(_))),
-        2
-    );
+    let pauses = |it: &RoomEvent| matches!(it, RoomEvent::Paused(_));
+    assert_eq!(mixed.table.happened(pauses), 2);
     mixed.table.assert_replays();
 }
 
@@ -277,22 +260,15 @@ fn a_correction_voids_what_followed_and_reopens_the_decision() {
     for seed in 0..12 {
         let mut mixed = Mixed::new([PERSON, PERSON, OPEN, PERSON], 1, seed);
         let (number, right) = mixed.misread();
-        let before = mixed
-            .table
-            .core
-            .open()
-            .map(|open| (open.decision.seat, open.id));
+        let open = mixed.table.core.open();
+        let before = open.map(|open| (open.decision.seat, open.id));
         let outcome = mixed.table.report(Report::Correction {
             number,
             instead: Some(Box::new(right)),
         });
         assert_eq!(outcome.verdict, ReportVerdict::Accepted);
-        assert_eq!(
-            mixed
-                .table
-                .happened(|it| matches!(it, RoomEvent::Correction(_))),
-            1
-        );
+        let corrections = |it: &RoomEvent| matches!(it, RoomEvent::Correction(_));
+        assert_eq!(mixed.table.happened(corrections), 1);
         if let (Some((seat, id)), Some(open)) = (before, mixed.table.core.open())
             && open.decision.seat == seat
         {
@@ -302,9 +278,7 @@ fn a_correction_voids_what_followed_and_reopens_the_decision() {
             let closed = mixed.table.answer(seat, id, action);
             assert_eq!(closed.verdict, crate::Verdict::Closed);
         }
-        mixed.until(|it| it.table.core.state().is_over());
-        let standings = mixed.table.core.game().expect("a game").standings();
-        assert_eq!(standings, mixed.real.truth.standings());
+        mixed.finish();
         let plays = |events: &[Event]| {
             let turn = |it: &&Event| matches!(it, Event::Played { .. } | Event::Passed { .. });
             events.iter().filter(turn).count()
@@ -319,26 +293,11 @@ fn a_correction_voids_what_followed_and_reopens_the_decision() {
 #[test]
 fn questions_are_bounded_and_answered() {
     let mut table = Table::physical(policy(), vec![PERSON; 4], shifts(1));
-    let question = |number: usize| {
-        Report::Question(Question {
-            id: format!("question {number}"),
-            text: "7 or 9 at place 4?".into(),
-            options: vec!["7".into(), "9".into()],
-            seat: None,
-        })
-    };
     for number in 0..MAX_QUESTIONS {
-        assert_eq!(
-            table.report(question(number)).verdict,
-            ReportVerdict::Accepted
-        );
+        let asked = table.report(question(format!("question {number}")));
+        assert_eq!(asked.verdict, ReportVerdict::Accepted);
     }
-    let one_more = Reported {
-        id: "one more".into(),
-        source: ReportSource::Camera,
-        age: Duration::ZERO,
-        report: question(MAX_QUESTIONS),
-    };
+    let one_more = reported("one more", question("one more".into()));
     let refused = table.core.report(table.now, one_more);
     assert_eq!(refused, Err(Refusal::TooManyQuestions.into()));
     table.report(Report::Answer {
@@ -371,9 +330,7 @@ fn a_restart_resumes_the_table() {
             assert_eq!(mixed.stage(), stage);
             mixed.table.attach(Seat::new(1));
         }
-        mixed.until(|it| it.table.core.state().is_over());
-        let standings = mixed.table.core.game().expect("a game").standings();
-        assert_eq!(standings, mixed.real.truth.standings());
+        mixed.finish();
         mixed.table.assert_replays();
     }
 }
@@ -382,12 +339,7 @@ fn a_restart_resumes_the_table() {
 fn what_cannot_be_judged_is_no_violation() {
     let mut mixed = Mixed::new([PERSON; 4], 1, 2);
     mixed.until(|it| it.sources().len() == 2);
-    mixed.table.report(Report::Question(Question {
-        id: "camera".into(),
-        text: "7 or 9 at place 4?".into(),
-        options: vec!["7".into(), "9".into()],
-        seat: None,
-    }));
+    mixed.table.report(question("camera".into()));
     let changes = mixed.table.core.changes();
     let no_option = Report::Answer {
         id: "camera".into(),
@@ -401,12 +353,7 @@ fn what_cannot_be_judged_is_no_violation() {
         (no_option, Refusal::NoSuchOption),
         (not_a_report, Refusal::NotCorrectable),
     ] {
-        let reported = Reported {
-            id: "refused".into(),
-            source: ReportSource::Camera,
-            age: Duration::ZERO,
-            report,
-        };
+        let reported = reported("refused", report);
         let refused = mixed.table.core.report(mixed.table.now, reported);
         assert_eq!(refused, Err(refusal.into()));
     }
@@ -448,12 +395,8 @@ fn a_play_for_a_remote_seat_that_it_did_not_decide_is_a_violation() {
         turn.is_some_and(|open| open.decision.kind == DecisionKind::Turn)
     });
     let (seat, _) = mixed.table.open();
-    let action = mixed
-        .table
-        .core
-        .legal_actions()
-        .nth(0)
-        .expect("one is legal");
+    let legal = mixed.table.core.legal_actions();
+    let action = legal.nth(0).expect("one is legal");
     let outcome = mixed.table.report(mixed.real.turn(seat, action));
     let ReportVerdict::Violation(violation) = outcome.verdict else {
         panic!("{:?}", outcome.verdict);

@@ -5,16 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, Event, Game, RuleSetSpec, Seat, Seed, Stop, TakenOver};
+use chefshat_engine::{ActionId, Event, Game, Seat, Seed, TakenOver};
 
 use super::{Answer, Core, OPEN, Table, Verdict, ms, one_shift};
-use crate::ids::Id;
 use crate::journal::{Branch, Change, Entry, Fill, GameHeader, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
-use crate::{
-    BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, MAX_EVENTS_KEPT, RECALL_TIME, State,
-};
+use crate::testing::{first_connection, id, shifts};
+use crate::{BUILT_IN_BUDGET, BadJournal, JOIN_HOLD, MAX_EVENTS_KEPT, RECALL_TIME, State};
 
 impl Table {
     /// Simulates a crash and a restart after `downtime`.
@@ -69,15 +67,11 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
 
 #[test]
 fn a_long_game_is_restored_with_its_last_events_alone() {
-    let rules = RuleSetSpec {
-        stop: Stop::Shifts(1_000),
-        ..RuleSetSpec::default()
-    };
     let delayed = Policy {
         spectator_delay_decisions: 3,
         ..policy()
     };
-    let mut table = Table::with_rules(delayed, vec![OPEN; 4], rules);
+    let mut table = Table::with_rules(delayed, vec![OPEN; 4], shifts(1_000));
     table.fill();
     let mut lengths = Vec::new();
     while table.core.log().len() < 2 * MAX_EVENTS_KEPT {
@@ -106,15 +100,11 @@ fn a_long_game_is_restored_with_its_last_events_alone() {
 
 #[test]
 fn what_delayed_spectators_have_not_seen_stays_also_after_a_restart() {
-    let rules = RuleSetSpec {
-        stop: Stop::Shifts(1_000),
-        ..RuleSetSpec::default()
-    };
     let delayed = Policy {
         spectator_delay_decisions: 10_000,
         ..policy()
     };
-    let mut table = Table::with_rules(delayed, vec![OPEN; 4], rules);
+    let mut table = Table::with_rules(delayed, vec![OPEN; 4], shifts(1_000));
     table.fill();
     while table.core.log().len() < 2 * MAX_EVENTS_KEPT {
         table.play_one();
@@ -193,15 +183,7 @@ fn built_in_agents_decide_the_same_after_a_restart() {
         table.pass_time(Duration::from_secs(60));
         assert_eq!(table.core.state(), State::Finished);
         table.assert_replays();
-        let actions: Vec<(Seat, ActionId)> = table
-            .journal
-            .iter()
-            .filter_map(|entry| match &entry.change {
-                Change::Decided(decided) => Some((decided.seat, decided.action)),
-                _ => None,
-            })
-            .collect();
-        actions
+        table.decided()
     };
     let undisturbed = play(&[]);
     assert!(undisturbed.len() > 30);
@@ -242,8 +224,7 @@ fn a_seat_that_waits_for_the_store_gets_the_time_back() {
 
     // It loses its connection and returns after half a second; that commit takes three.
     let (seat, id) = table.open();
-    let connection = u64::try_from(seat.index()).expect("small") + 1;
-    table.lost(seat, ConnectionId(connection));
+    table.lost(seat, first_connection(seat));
     let lost = table.now;
     table.pass_time(ms(500));
     table.store_takes = ms(3_000);
@@ -293,7 +274,7 @@ fn invalid_answers_gain_no_time_from_a_fast_store() {
 #[test]
 fn a_substitute_plays_until_the_agent_returns() {
     let mut table = Table::playing(policy());
-    while table.happened(|it| matches!(it, RoomEvent::Substituted(_))) == 0 {
+    while table.substituted() == 0 {
         let (seat, _) = table.open();
         if seat == Seat::new(2) {
             // Exactly as long as it takes to time out.
@@ -318,18 +299,14 @@ fn a_waiting_room_keeps_its_seats_for_returning_clients() {
         },
         vec![OPEN; 4],
     );
-    for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("a seat is free");
-    }
+    table.join_all(ParticipantKind::Agent);
     table.attach(Seat::new(0));
     // The waiting time is long over when the server is restarted.
     table.restart(Duration::from_secs(86_400));
     assert_eq!(table.core.state(), State::Waiting);
     table.pass_time(JOIN_HOLD - ms(1));
     assert_eq!(table.core.state(), State::Waiting);
-    for seat in 0..4 {
-        table.attach(Seat::new(seat));
-    }
+    table.attach_all();
     assert_eq!(table.core.state(), State::Playing);
     table.assert_replays();
 
@@ -429,16 +406,9 @@ fn an_inconsistent_journal_is_refused() {
 #[test]
 fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
     // A recorded game of six Shifts, by first legal actions.
-    let rules = RuleSetSpec {
-        stop: Stop::Shifts(6),
-        ..RuleSetSpec::default()
-    };
     let seed = Seed([5; 32]);
-    let mut game = Game::new(
-        rules.clone().validate().expect("a valid rule set"),
-        seed,
-        |_| {},
-    );
+    let rules = shifts(6).validate().expect("a valid rule set");
+    let mut game = Game::new(rules, seed, |_| {});
     let mut actions = Vec::new();
     while !game.is_over() {
         let action = game.legal_actions().nth(0).expect("a legal action");
@@ -448,21 +418,15 @@ fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
     actions.truncate(actions.len() - 3);
     let count = u64::try_from(actions.len()).expect("small");
     assert!(actions.len() > 3 * BUILT_IN_BUDGET, "{count}");
-    let mut table = Table::with_rules(Policy::default(), vec![OPEN; 4], rules);
+    let mut table = Table::with_rules(Policy::default(), vec![OPEN; 4], shifts(6));
     let mut header = GameHeader::clone(table.core.header());
     header.start.branch = Some(Branch {
-        game: Id::from_bytes([9; 16]),
+        game: id(9),
         same_deals: true,
         taken_over: vec![TakenOver { seed, actions }],
     });
     table.core = Core::new(Arc::new(header));
-    let seats: Vec<Seat> = table.core.all_seats().collect();
-    for _ in &seats {
-        table.join(ParticipantKind::Agent).expect("a free seat");
-    }
-    for seat in seats {
-        table.attach(seat);
-    }
+    table.fill();
     let mut ticks = 0;
     while table.core.decisions() < count {
         assert!(table.core.awaited().is_none(), "no seat is asked");

@@ -3,6 +3,7 @@
 use chefshat_agents::{AgentKind, Budget, BuiltInAgent, MonteCarlo, NamedAgent};
 use chefshat_engine::{ActionId, DecisionKind, Event, Viewer};
 
+use crate::testing::first_connection;
 use crate::tests::*;
 use crate::{
     HintError, MAX_HINTS, MAX_SEARCH_TIME, SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED,
@@ -58,6 +59,11 @@ fn last_legal(request: &SearchRequest) -> Searched {
     found(request.legal.iter().last())
 }
 
+/// Says what was found for a request.
+fn answer(table: &mut Table, request: &SearchRequest, found: Searched) {
+    (table.core).searched(request.seat, request.decision, found);
+}
+
 #[test]
 fn a_decision_waits_for_the_search_and_takes_what_it_found() {
     let mut table = searching(0);
@@ -83,19 +89,15 @@ fn a_decision_waits_for_the_search_and_takes_what_it_found() {
             decisions,
             "that was for another decision"
         );
-        table
-            .core
-            .searched(request.seat, request.decision, found(given));
+        answer(&mut table, &request, found(given));
         let mut prior = BuiltInAgent::new(AgentKind::Trained, [0; 32]);
         let expected = given.unwrap_or_else(|| prior.decide(&request.observation, &request.legal));
         let length = table.journal.len();
         table.pass_time(ms(0));
-        let taken = table.journal[length..]
-            .iter()
-            .find_map(|entry| match &entry.change {
-                Change::Decided(decided) => Some(decided.clone()),
-                _ => None,
-            });
+        let taken = (table.journal[length..].iter()).find_map(|entry| match &entry.change {
+            Change::Decided(decided) => Some(decided.clone()),
+            _ => None,
+        });
         let taken = taken.expect("a decision");
         let who = (taken.seat, taken.action, taken.source);
         assert_eq!(who, (request.seat, expected, Source::Agent));
@@ -134,9 +136,7 @@ fn an_illegal_result_counts_as_none() {
     let illegal = (0..u16::MAX)
         .map(ActionId::new)
         .find(|action| !request.legal.contains(*action));
-    table
-        .core
-        .searched(request.seat, request.decision, found(illegal));
+    answer(&mut table, &request, found(illegal));
     table.pass_time(ms(0));
     assert!(table.core.decisions() > 0);
     table.assert_replays();
@@ -147,9 +147,7 @@ fn a_search_is_part_of_the_pace() {
     let mut table = searching(500);
     let request = next_search(&mut table).expect("a search");
     let decisions = table.core.decisions();
-    table
-        .core
-        .searched(request.seat, request.decision, last_legal(&request));
+    answer(&mut table, &request, last_legal(&request));
     table.pass_time(ms(499));
     assert_eq!(table.core.decisions(), decisions);
     table.pass_time(ms(1));
@@ -184,14 +182,10 @@ fn after_a_restart_the_open_decision_is_searched_again_from_what_the_seat_knows(
             ));
             assert!((request.history.iter()).all(|event| event.seen_by(seat) == *event));
             let found = last_legal(&request);
-            table.core.searched(request.seat, request.decision, found);
+            answer(&mut table, &request, found);
         }
         table.assert_replays();
-        let decided = |entry: &crate::journal::Entry| match &entry.change {
-            Change::Decided(decided) => Some((decided.seat, decided.action)),
-            _ => None,
-        };
-        table.journal.iter().filter_map(decided).collect::<Vec<_>>()
+        table.decided()
     };
     assert_eq!(play(true), play(false));
 }
@@ -218,9 +212,7 @@ fn a_seat_that_returns_from_a_substitute_is_not_played_by_its_search() {
     assert_eq!(request.patience, SEARCH_PATIENCE, "others wait");
     table.attach(seat);
     let decisions = table.core.decisions();
-    table
-        .core
-        .searched(request.seat, request.decision, last_legal(&request));
+    answer(&mut table, &request, last_legal(&request));
     table.core.tick(table.now, None);
     assert_eq!(table.core.decisions(), decisions, "the seat decides itself");
     assert_eq!(table.play_one(), seat);
@@ -234,11 +226,8 @@ fn a_hint_is_recorded_and_bounded() {
     };
     let mut table = Table::playing(policy);
     let (seat, decision) = table.open();
-    let other = table
-        .core
-        .all_seats()
-        .find(|it| *it != seat)
-        .expect("another seat");
+    let other = table.core.all_seats().find(|it| *it != seat);
+    let other = other.expect("another seat");
     let ask = |table: &mut Table, seat, decision| {
         let started = table.core.start_hint(seat, decision, MonteCarlo::default());
         started.map(|request| (request.seat, request.decision))
@@ -285,8 +274,7 @@ fn a_hint_that_runs_counts_while_its_seat_returns_from_a_lost_server() {
         started.map(drop)
     };
     assert_eq!(ask(&mut table), Ok(()));
-    let connection = ConnectionId(seat.index() as u64 + 1);
-    (table.core).lost_with_node(table.now, seat, connection, None);
+    (table.core).lost_with_node(table.now, seat, first_connection(seat), None);
     table.commit();
     table.attach(seat);
     assert_eq!(table.open(), (seat, decision));

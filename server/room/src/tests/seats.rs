@@ -39,9 +39,7 @@ fn reserved_seats_are_only_given_to_their_kind() {
 #[test]
 fn a_seat_that_is_never_attached_is_freed() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
-    for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("a free seat");
-    }
+    table.join_all(ParticipantKind::Agent);
     table.attach(Seat::new(2));
     table.pass_time(JOIN_HOLD);
     assert_eq!(
@@ -62,9 +60,7 @@ fn a_seat_that_is_never_attached_is_freed() {
 #[test]
 fn the_game_starts_when_every_seat_is_attached() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
-    for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("a free seat");
-    }
+    table.join_all(ParticipantKind::Agent);
     for seat in 0..3 {
         table.attach(Seat::new(seat));
     }
@@ -77,11 +73,8 @@ fn the_game_starts_when_every_seat_is_attached() {
 fn an_answer_counts_once_and_is_acknowledged_again_if_repeated() {
     let mut table = Table::playing(Policy::default());
     let (seat, id) = table.open();
-    let other = table
-        .core
-        .all_seats()
-        .find(|other| *other != seat)
-        .expect("there are four seats");
+    let other = table.core.all_seats().find(|other| *other != seat);
+    let other = other.expect("there are four seats");
     let action = table.legal(0);
     assert_eq!(
         table.answer(other, 1, action).verdict,
@@ -204,16 +197,12 @@ fn annotations_are_limited() {
     let annotate = |table: &mut Table, bytes: usize| {
         let (seat, decision_id) = table.open();
         let action = table.legal(0);
-        let answered = table.core.answer(
-            table.now,
-            seat,
-            Answer {
-                annotations: Some(vec![0; bytes].into_boxed_slice()),
-                ..Answer::new(decision_id, action)
-            },
-            table.now,
-            None,
-        );
+        let answer = Answer {
+            annotations: Some(vec![0; bytes].into_boxed_slice()),
+            ..Answer::new(decision_id, action)
+        };
+        let now = table.now;
+        let answered = table.core.answer(now, seat, answer, now, None);
         table.commit();
         (answered, table.answer(seat, decision_id, action))
     };
@@ -261,9 +250,7 @@ fn delayed_spectators_see_events_after_a_number_of_decisions() {
 fn a_freed_seat_has_no_state_of_its_former_participant() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
     let seats: Vec<Seat> = table.core.all_seats().collect();
-    for _ in &seats {
-        table.join(ParticipantKind::Agent).expect("a seat is free");
-    }
+    table.join_all(ParticipantKind::Agent);
     // The first is never attached, the second loses its connection, the third is attached; they
     // leave.
     let connection = table.attach(seats[1]);
@@ -340,9 +327,7 @@ fn the_ticket_of_a_participant_who_left_is_unknown() {
 #[test]
 fn a_game_that_has_not_started_is_aborted_when_a_participant_leaves() {
     let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
-    for _ in 0..4 {
-        table.join(ParticipantKind::Agent).expect("a free seat");
-    }
+    table.join_all(ParticipantKind::Agent);
     table.core.retire(table.now, Seat::new(2), None);
     table.commit();
     assert_eq!(

@@ -12,11 +12,8 @@ use crate::policy::{AbortPolicy, KindClock};
 use crate::testing::{dealt, second_shift};
 
 /// A table at the start of its second Shift, where seat 2 holds both jokers.
-fn offered(policy: Policy, fills: Vec<Fill>) -> Table {
-    let rules = RuleSetSpec::default();
-    let valid = rules.validate().expect("a valid rule set");
-    let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
-    Table::scripted(policy, fills, rules, second_shift(hands))
+fn offered(policy: Policy) -> Table {
+    Table::with_jokers_at(policy, vec![OPEN; 4], [Seat::new(2); 2])
 }
 
 fn policy() -> Policy {
@@ -29,15 +26,9 @@ fn policy() -> Policy {
     }
 }
 
-fn substituted(table: &Table) -> usize {
-    table.happened(|event| matches!(event, RoomEvent::Substituted(_)))
-}
-
 /// Plays for the other seats and lets this one run out its next decision.
 fn run_out(table: &mut Table, seat: Seat) {
-    while table.open().0 != seat {
-        table.play_one();
-    }
+    table.play_until(seat);
     let decisions = table.core.decisions();
     let (left, bank) = table.core.time_left(table.now);
     table.pass_time(left + bank);
@@ -47,8 +38,7 @@ fn run_out(table: &mut Table, seat: Seat) {
 
 #[test]
 fn a_special_action_that_runs_out_counts_for_nothing() {
-    let mut table = offered(policy(), vec![OPEN; 4]);
-    table.fill();
+    let mut table = offered(policy());
     let (seat, _) = table.open();
     assert_eq!(seat, Seat::new(2));
     assert_eq!(
@@ -60,20 +50,19 @@ fn a_special_action_that_runs_out_counts_for_nothing() {
     assert_eq!(table.last_decision().bank_left_ms, 500);
     run_out(&mut table, seat);
     assert_eq!(
-        substituted(&table),
+        table.substituted(),
         0,
         "only one public decision ran out so far"
     );
     run_out(&mut table, seat);
-    assert_eq!(substituted(&table), 1);
+    assert_eq!(table.substituted(), 1);
     table.assert_replays();
 }
 
 #[test]
 fn declining_does_not_forgive_earlier_timeouts() {
     for declares in [false, true] {
-        let mut table = offered(policy(), vec![OPEN; 4]);
-        table.fill();
+        let mut table = offered(policy());
         let seat = Seat::new(2);
         table.core.seats[2].timeouts = 1;
         let actions = table.core.header().rules.actions();
@@ -84,7 +73,7 @@ fn declining_does_not_forgive_earlier_timeouts() {
         let (_, id) = table.open();
         table.answer(seat, id, action.index().into());
         run_out(&mut table, seat);
-        assert_eq!(substituted(&table), usize::from(!declares));
+        assert_eq!(table.substituted(), usize::from(!declares));
     }
 }
 
@@ -100,7 +89,11 @@ fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
         ..policy()
     };
     for holder in [ParticipantKind::Agent, ParticipantKind::Human] {
-        let mut table = offered(with_people.clone(), vec![OPEN; 4]);
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
+        let script = second_shift(hands);
+        let mut table = Table::scripted(with_people.clone(), vec![OPEN; 4], rules, script);
         for seat in 0..4 {
             let other = match holder {
                 ParticipantKind::Agent => ParticipantKind::Human,
@@ -109,9 +102,7 @@ fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
             let kind = if seat == 2 { holder } else { other };
             table.join(kind).expect("a seat is free");
         }
-        for seat in table.core.all_seats() {
-            table.attach(seat);
-        }
+        table.attach_all();
         assert_eq!(table.core.time_left(table.now), (ms(5000), ms(0)));
         let deadline = table.core.deadline().expect("a decision is open");
         table.pass_time(ms(5000));
@@ -124,14 +115,11 @@ fn the_time_for_a_special_action_does_not_tell_the_kind_of_its_holder() {
 fn a_built_in_agent_takes_no_time_for_a_special_action() {
     let mut fills = vec![OPEN; 4];
     fills[2] = Fill::BuiltIn(AgentKind::Greedy.into());
-    let mut table = offered(
-        Policy {
-            pace: Some(ms(300)),
-            ..policy()
-        },
-        fills,
-    );
-    table.fill();
+    let paced = Policy {
+        pace: Some(ms(300)),
+        ..policy()
+    };
+    let table = Table::with_jokers_at(paced, fills, [Seat::new(2); 2]);
     assert_eq!(table.core.decisions(), 1);
     let open = table.core.open().expect("a decision is open");
     assert_ne!(open.decision.kind, DecisionKind::SpecialAction);
@@ -141,14 +129,10 @@ fn a_built_in_agent_takes_no_time_for_a_special_action() {
 
 #[test]
 fn delayed_spectators_do_not_see_further_because_of_a_silent_decision() {
-    let mut table = offered(
-        Policy {
-            spectator_delay_decisions: 1,
-            ..policy()
-        },
-        vec![OPEN; 4],
-    );
-    table.fill();
+    let mut table = offered(Policy {
+        spectator_delay_decisions: 1,
+        ..policy()
+    });
     let visible = table.core.visible_to_spectators();
     let decline: ActionId = table.core.header().rules.actions().decline();
     let (seat, id) = table.open();
@@ -159,8 +143,7 @@ fn delayed_spectators_do_not_see_further_because_of_a_silent_decision() {
 #[test]
 fn leaving_does_not_tell_who_is_offered_a_special_action() {
     for leaver in [1, 2] {
-        let mut table = offered(policy(), vec![OPEN; 4]);
-        table.fill();
+        let mut table = offered(policy());
         let retired = |table: &Table| table.happened(|it| matches!(it, RoomEvent::Retired(_)));
         let (events, offered_at) = (table.core.log().len(), table.now);
         table.core.retire(table.now, Seat::new(leaver), None);
@@ -190,12 +173,8 @@ fn the_first_gift_is_asked_for_at_the_same_time_whoever_is_offered_a_special_act
     };
     // Nobody is offered one, its holder thinks before it declines, or lets it run out.
     for (holders, thinks) in [([1, 2], 0), ([2, 2], 0), ([2, 2], 320), ([2, 2], 900)] {
-        let rules = RuleSetSpec::default();
-        let valid = rules.validate().expect("a valid rule set");
-        let hands = dealt(&valid, 3, holders.map(Seat::new)).expect("every seat has cards to swap");
-        let script = second_shift(hands);
-        let mut table = Table::scripted(paced.clone(), vec![OPEN; 4], rules, script);
-        table.fill();
+        let seats = holders.map(Seat::new);
+        let mut table = Table::with_jokers_at(paced.clone(), vec![OPEN; 4], seats);
         let (seat, decision) = giver(&table);
         table.pass_time(ms(thinks.min(499)));
         if holders == [2, 2] && thinks < 500 {
@@ -225,15 +204,11 @@ fn the_first_gift_is_asked_for_at_the_same_time_whoever_is_offered_a_special_act
 #[test]
 fn after_a_restart_the_first_gift_is_asked_for_at_the_same_time_too() {
     for holders in [[1, 2], [2, 2]] {
-        let rules = RuleSetSpec::default();
-        let valid = rules.validate().expect("a valid rule set");
-        let hands = dealt(&valid, 3, holders.map(Seat::new)).expect("every seat has cards to swap");
         let paced = Policy {
             pace: Some(ms(50)),
             ..policy()
         };
-        let mut table = Table::scripted(paced, vec![OPEN; 4], rules, second_shift(hands));
-        table.fill();
+        let mut table = Table::with_jokers_at(paced, vec![OPEN; 4], holders.map(Seat::new));
         table.pass_time(ms(300));
         let header = Arc::clone(table.core.header());
         let core = Core::revived(header, &table.journal, ms(2_000)).expect("a good journal");
@@ -247,12 +222,7 @@ fn a_short_pace_leaves_a_special_action_its_whole_decision_time() {
         pace: Some(ms(49)),
         ..policy()
     };
-    let rules = RuleSetSpec::default();
-    let valid = rules.validate().expect("a valid rule set");
-    let hands =
-        dealt(&valid, 3, [Seat::new(2), Seat::new(2)]).expect("every seat has cards to swap");
-    let mut table = Table::scripted(paced, vec![OPEN; 4], rules, second_shift(hands));
-    table.fill();
+    let table = offered(paced);
     assert!(table.core.awaited().expect("the holder").is_silent());
     assert_eq!(table.core.time_left(table.now), (ms(1000), Duration::ZERO));
     table.assert_replays();

@@ -44,12 +44,7 @@ fn step(table: &mut Table, input: &Input) {
             let _ = table.core.join(
                 table.now,
                 seat,
-                SeatedParticipant {
-                    name: "somebody".into(),
-                    name_fingerprint: String::new(),
-                    kind: ParticipantKind::Agent,
-                    ticket: SecretHash::of(b"ticket"),
-                },
+                participant("somebody", ParticipantKind::Agent),
             );
         }
         Input::Attach(seat) => {

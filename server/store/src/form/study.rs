@@ -574,10 +574,6 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
             passed_over: form.passed_over,
             at_ms: form.at_ms,
         },
-        KindForm::DroppedOut(form) => Change::DroppedOut {
-            number: form.number,
-            at_ms: form.at_ms,
-        },
         KindForm::Grouped(form) => Change::Grouped {
             number: form.number,
             group: form.group,
@@ -585,21 +581,17 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
             passed_over: form.passed_over,
             at_ms: form.at_ms,
         },
-        KindForm::LeftOver(form) => Change::LeftOver {
-            number: form.number,
-            at_ms: form.at_ms,
-        },
-        KindForm::ScreenedOut(form) => Change::ScreenedOut {
-            number: form.number,
-            at_ms: form.at_ms,
-        },
+        KindForm::LeftOver(MarkForm { number, at_ms, .. }) => Change::LeftOver { number, at_ms },
+        KindForm::DroppedOut(MarkForm { number, at_ms, .. }) => {
+            Change::DroppedOut { number, at_ms }
+        }
+        KindForm::ScreenedOut(MarkForm { number, at_ms, .. }) => {
+            Change::ScreenedOut { number, at_ms }
+        }
+        KindForm::Removed(MarkForm { number, at_ms, .. }) => Change::Removed { number, at_ms },
         KindForm::Withdrew(form) => Change::Withdrew {
             number: form.number,
             delete_data: form.flag,
-            at_ms: form.at_ms,
-        },
-        KindForm::Removed(form) => Change::Removed {
-            number: form.number,
             at_ms: form.at_ms,
         },
         KindForm::Closed(_) => Change::Closed,

@@ -15,9 +15,10 @@ use std::sync::Arc;
 
 use chefshat_postgres::Database;
 use chefshat_proto::v1;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::SecretHash;
 use chefshat_room::journal::{AbortReason, Change, Entry, GameHeader, TournamentGame};
 use chefshat_room::policy::Durability;
+use chefshat_room::testing::id;
 use chefshat_tournament::Change as TournamentChange;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
@@ -25,7 +26,7 @@ use sqlx::postgres::PgConnection;
 
 use super::*;
 use crate::cluster::{ClusterStore, Epoch, Heartbeat, NodeId, NodeInfo, Subject};
-use crate::testing::{self, TypedUnits as _};
+use crate::testing::{self, TypedUnits as _, begin, end, ended};
 use crate::tournaments::{TournamentEntry, TournamentHeader};
 use crate::units::UnitKey;
 
@@ -120,10 +121,10 @@ async fn waiting(connection: &mut PgConnection, wait_event: &str) -> i32 {
 /// A room with the id `room`, whose game has the same id.
 fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameHeader> {
     Arc::new(GameHeader {
-        room_id: Id::from_bytes([room; 16]),
+        room_id: id(room),
         join_code: format!("ROOM{room}"),
         tournament: tournament.map(|tournament| TournamentGame {
-            tournament: Id::from_bytes([tournament; 16]),
+            tournament: id(tournament),
             series: None,
         }),
         ..GameHeader::clone(&testing::header(room, durability))
@@ -136,7 +137,7 @@ fn durable(room: u8) -> Arc<GameHeader> {
 
 fn cup(tournament: u8) -> Arc<TournamentHeader> {
     Arc::new(TournamentHeader {
-        id: Id::from_bytes([tournament; 16]),
+        id: id(tournament),
         settings: v1::TournamentSettings::default(),
         created_at_ms: 1_000,
         join_code: format!("CUP{tournament}"),
@@ -175,23 +176,44 @@ fn numbers(entries: &[Entry]) -> Vec<u64> {
         .collect()
 }
 
+/// Creates a durable room.
+async fn created(store: &PostgresStore, room: u8) -> Box<dyn Journal> {
+    begin(store, &durable(room), vec![entry(1)]).await
+}
+
+/// Ends the game of a room.
+async fn finish(journal: &mut Box<dyn Journal>, room: u8) {
+    end(journal, summary(room)).await;
+}
+
+/// Creates and ends a game of a room, whose record has been written to a file.
+async fn played(store: &PostgresStore, room: u8) {
+    let mut journal = created(&store, room).await;
+    finish(&mut journal, room).await;
+    let written = store.mark_record_written(id(room)).await;
+    written.expect("committed");
+}
+
+/// Creates a tournament that has begun.
+async fn create_cup(store: &PostgresStore, tournament: u8) {
+    let created = store.create_tournament(cup(tournament), begun()).await;
+    created.expect("created");
+}
+
 async fn append(journal: &mut Box<dyn Journal>, number: u64) -> Result<(), StoreError> {
     journal.append(&mut vec![entry(number)]).await
 }
 
 /// Number of rows of a tournament's journal.
 async fn tournament_rows(store: &PostgresStore, tournament: u8) -> u64 {
-    let unit = UnitKey::Tournament(Id::from_bytes([tournament; 16]));
+    let unit = UnitKey::Tournament(id(tournament));
     let stored = store.unit(unit).await.expect("readable");
     stored.expect("it exists").rows.len() as u64
 }
 
 /// The only game of a unit.
 async fn resumed(store: &PostgresStore, unit: u8, epoch: Epoch) -> ResumableGame {
-    let unit = store
-        .load(Id::from_bytes([unit; 16]), epoch)
-        .await
-        .expect("readable");
+    let unit = store.load(id(unit), epoch).await.expect("readable");
     let mut games = unit.expect("it is owned").games;
     assert_eq!(games.len(), 1);
     games.remove(0)

@@ -11,12 +11,11 @@ use tracing::error;
 use super::errors::{failure, is_temporary};
 use super::open::{self, DatabaseError};
 use super::partitions;
-use super::values::{FIRST_EPOCH, indexed_name, text};
+use super::values::{FIRST_EPOCH, indexed_name, number_of, text};
 use crate::form;
 use crate::sql::integer;
-use crate::sqlite::{
-    self, Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
-};
+use crate::sqlite::{self, Contents, GameRow, JournalRow, ParticipantRow, TracesRow, UnitHeader};
+use crate::units::UnitKind;
 use crate::{DATABASE_FILE, OpenError, StoreError};
 use chefshat_record::atomic_file::WriteError;
 use chefshat_room::ids::random_bytes;
@@ -120,8 +119,13 @@ pub async fn transfer(
         return Err(TransferError::NotEmpty);
     }
     let mut moved = Transferred::default();
-    move_tournaments(&contents, &mut transaction, &mut moved).await?;
-    move_studies(&contents, &mut transaction, &mut moved).await?;
+    let tournaments = move_units(UnitKind::Tournament, &contents, &mut transaction).await?;
+    (moved.tournaments, moved.unreadable) = tournaments;
+    (moved.studies, _) = move_units(UnitKind::Study, &contents, &mut transaction).await?;
+    let mut traces = contents.traces();
+    while let Some(row) = traces.try_next().await? {
+        insert_traces(&mut transaction, &row).await?;
+    }
     let all = contents.count().await?;
     partitions::add(&mut transaction, contents.newest_game().await?).await?;
     let mut games = contents.games();
@@ -172,70 +176,31 @@ pub async fn transfer(
     }
 }
 
-async fn move_tournaments(
+/// Moves the tournaments or studies with their journals. Returns how many there are, and how many of
+/// them cannot be read.
+async fn move_units(
+    kind: UnitKind,
     contents: &Contents,
     connection: &mut PgConnection,
-    moved: &mut Transferred,
-) -> Result<(), TransferError> {
-    let mut tournaments = contents.tournaments();
-    while let Some(tournament) = tournaments.try_next().await? {
-        moved.tournaments += 1;
-        moved.unreadable += u64::from(!insert_tournament(connection, &tournament).await?);
+) -> Result<(u64, u64), TransferError> {
+    let (mut moved, mut unreadable) = (0, 0);
+    let mut units = contents.units(kind);
+    while let Some(unit) = units.try_next().await? {
+        moved += 1;
+        unreadable += u64::from(!insert_unit(connection, kind, &unit).await?);
     }
+    let table = match kind {
+        UnitKind::Tournament => "tournament_entries",
+        UnitKind::Study => "study_changes",
+    };
     let mut rows = Vec::new();
-    let mut journals = contents.tournament_journals();
+    let mut journals = contents.unit_journals(kind);
     while let Some(row) = journals.try_next().await? {
         rows.push(row);
-        insert_full(connection, "tournament_entries", &mut rows).await?;
+        insert_full(connection, table, &mut rows).await?;
     }
-    insert_rows(connection, "tournament_entries", &mut rows).await
-}
-
-async fn move_studies(
-    contents: &Contents,
-    connection: &mut PgConnection,
-    moved: &mut Transferred,
-) -> Result<(), TransferError> {
-    let mut studies = contents.studies();
-    while let Some(study) = studies.try_next().await? {
-        moved.studies += 1;
-        insert_study(connection, &study).await?;
-    }
-    let mut rows = Vec::new();
-    let mut journals = contents.study_journals();
-    while let Some(row) = journals.try_next().await? {
-        rows.push(row);
-        insert_full(connection, "study_changes", &mut rows).await?;
-    }
-    insert_rows(connection, "study_changes", &mut rows).await?;
-    let mut traces = contents.traces();
-    while let Some(row) = traces.try_next().await? {
-        insert_traces(connection, &row).await?;
-    }
-    Ok(())
-}
-
-/// Inserts a study, which the next node takes over.
-async fn insert_study(
-    connection: &mut PgConnection,
-    study: &StudyRow,
-) -> Result<(), TransferError> {
-    sqlx::query(
-        "WITH study AS (
-             INSERT INTO studies (number, study_id, form, header)
-             OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4)
-         )
-         INSERT INTO owned (id, unit, kind, epoch, join_code, durable, form)
-         VALUES ($2, $2, 2, $5, 'study ' || encode($2, 'hex'), true, $3)",
-    )
-    .bind(study.number)
-    .bind(study.id.as_slice())
-    .bind(study.form)
-    .bind(study.header.as_slice())
-    .bind(FIRST_EPOCH)
-    .execute(connection)
-    .await?;
-    Ok(())
+    insert_rows(connection, table, &mut rows).await?;
+    Ok((moved, unreadable))
 }
 
 async fn insert_traces(
@@ -256,38 +221,50 @@ async fn insert_traces(
     Ok(())
 }
 
-/// Inserts a tournament; `false` if it cannot be read, so that nobody resumes it.
-async fn insert_tournament(
+/// Inserts a tournament or study, which the next node takes over; `false` if it is a tournament that
+/// cannot be read, so that nobody resumes it.
+async fn insert_unit(
     connection: &mut PgConnection,
-    tournament: &TournamentRow,
+    kind: UnitKind,
+    unit: &UnitHeader,
 ) -> Result<bool, TransferError> {
-    sqlx::query(
-        "INSERT INTO tournaments (number, tournament_id, form, over, header)
-         OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4, $5)",
-    )
-    .bind(tournament.number)
-    .bind(tournament.id.as_slice())
-    .bind(tournament.form)
-    .bind(tournament.over)
-    .bind(tournament.header.as_slice())
+    sqlx::query(kind.sql(
+        "INSERT INTO {units} (number, {unit_id}, form, header)
+         OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4)",
+    ))
+    .bind(unit.number)
+    .bind(unit.id.as_slice())
+    .bind(unit.form)
+    .bind(unit.header.as_slice())
     .execute(&mut *connection)
     .await?;
-    let header = match form::tournament_from_bytes(&tournament.header) {
-        Ok(header) => header,
-        Err(problem) => {
-            error!(number = tournament.number, %problem, "a tournament cannot be read");
-            return Ok(false);
-        }
+    if unit.over {
+        sqlx::query("UPDATE tournaments SET over = true WHERE number = $1")
+            .bind(unit.number)
+            .execute(&mut *connection)
+            .await?;
+    }
+    let join_code = match kind {
+        UnitKind::Study => None,
+        UnitKind::Tournament => match form::tournament_from_bytes(&unit.header) {
+            Ok(header) => Some(header.join_code),
+            Err(problem) => {
+                error!(number = unit.number, %problem, "a tournament cannot be read");
+                return Ok(false);
+            }
+        },
     };
     sqlx::query(
         "INSERT INTO owned (id, unit, kind, epoch, join_code, durable, form, over, ended_ms)
-         VALUES ($1, $1, 1, $2, $3, true, $4, $5, CASE WHEN $5 THEN clock_ms() END)",
+         VALUES ($1, $1, $2, $3, coalesce($4, 'study ' || encode($1, 'hex')), true, $5, $6,
+                 CASE WHEN $6 THEN clock_ms() END)",
     )
-    .bind(tournament.id.as_slice())
+    .bind(unit.id.as_slice())
+    .bind(number_of(kind))
     .bind(FIRST_EPOCH)
-    .bind(text(&header.join_code))
-    .bind(tournament.form)
-    .bind(tournament.over)
+    .bind(join_code.as_deref().map(text))
+    .bind(unit.form)
+    .bind(unit.over)
     .execute(connection)
     .await?;
     Ok(true)

@@ -5,13 +5,14 @@ use std::path::Path;
 
 use futures::stream::BoxStream;
 use futures::{StreamExt as _, TryStreamExt as _};
-use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqlSafeStr};
 
 use super::errors::failure;
 use super::open::{self, IfGone, OpenError, Opened};
 use super::rows::with_own_rows;
 use crate::StoreError;
+use crate::units::UnitKind;
 
 /// A game as stored.
 pub(crate) struct GameRow {
@@ -34,9 +35,9 @@ pub(crate) struct GameRow {
     last_row: Option<i64>,
 }
 
-/// A row of the journal of a game or tournament.
+/// A row of the journal of a game, tournament or study.
 pub(crate) struct JournalRow {
-    /// The number of the game or tournament.
+    /// The number of the game, tournament or study.
     pub(crate) of: i64,
     pub(crate) position: i64,
     pub(crate) entries: Vec<u8>,
@@ -51,21 +52,14 @@ pub(crate) struct ParticipantRow {
     pub(crate) kind: i32,
 }
 
-/// A tournament as stored.
-pub(crate) struct TournamentRow {
+/// A tournament or study as stored, without its journal.
+pub(crate) struct UnitHeader {
     pub(crate) number: i64,
     pub(crate) id: Vec<u8>,
     pub(crate) form: i64,
+    pub(crate) header: Vec<u8>,
+    /// A study is never over.
     pub(crate) over: bool,
-    pub(crate) header: Vec<u8>,
-}
-
-/// A study as stored.
-pub(crate) struct StudyRow {
-    pub(crate) number: i64,
-    pub(crate) id: Vec<u8>,
-    pub(crate) form: i64,
-    pub(crate) header: Vec<u8>,
 }
 
 /// Interface traces as stored.
@@ -106,25 +100,29 @@ impl Contents {
             .map_err(failure)
     }
 
-    /// The studies, in the order of their numbers.
-    pub(crate) fn studies(&self) -> Rows<'_, StudyRow> {
-        self.rows(
-            "SELECT number, study_id, form, header FROM studies ORDER BY number",
-            |row| StudyRow {
-                number: row.get(0),
-                id: row.get(1),
-                form: row.get(2),
-                header: row.get(3),
-            },
-        )
+    /// The tournaments or studies, in the order of their numbers.
+    pub(crate) fn units(&self, kind: UnitKind) -> Rows<'_, UnitHeader> {
+        let text = match kind {
+            UnitKind::Tournament => {
+                "SELECT number, tournament_id, form, header, over FROM tournaments ORDER BY number"
+            }
+            UnitKind::Study => {
+                "SELECT number, study_id, form, header, false FROM studies ORDER BY number"
+            }
+        };
+        self.rows(text, |row| UnitHeader {
+            number: row.get(0),
+            id: row.get(1),
+            form: row.get(2),
+            header: row.get(3),
+            over: row.get(4),
+        })
     }
 
-    /// The journals of all studies.
-    pub(crate) fn study_journals(&self) -> Rows<'_, JournalRow> {
-        self.rows(
-            "SELECT study, position, changes FROM study_changes ORDER BY study, position",
-            journal_row,
-        )
+    /// The journals of all tournaments or studies.
+    pub(crate) fn unit_journals(&self, kind: UnitKind) -> Rows<'_, JournalRow> {
+        let text = "SELECT {unit}, position, {entries} FROM {rows} ORDER BY {unit}, position";
+        self.rows(kind.sql(text), journal_row)
     }
 
     /// The interface traces of all studies, in the order in which they were added.
@@ -206,29 +204,7 @@ impl Contents {
         )
     }
 
-    /// The tournaments, in the order of their numbers.
-    pub(crate) fn tournaments(&self) -> Rows<'_, TournamentRow> {
-        self.rows(
-            "SELECT number, tournament_id, form, over, header FROM tournaments ORDER BY number",
-            |row| TournamentRow {
-                number: row.get(0),
-                id: row.get(1),
-                form: row.get(2),
-                over: row.get(3),
-                header: row.get(4),
-            },
-        )
-    }
-
-    /// The journals of all tournaments.
-    pub(crate) fn tournament_journals(&self) -> Rows<'_, JournalRow> {
-        self.rows(
-            "SELECT tournament, position, entries FROM tournament_entries ORDER BY tournament, position",
-            journal_row,
-        )
-    }
-
-    fn rows<T: 'static>(&self, query: &'static str, row: fn(SqliteRow) -> T) -> Rows<'_, T> {
+    fn rows<T: 'static>(&self, query: impl SqlSafeStr, row: fn(SqliteRow) -> T) -> Rows<'_, T> {
         (sqlx::query(query).fetch(&self.0.readers))
             .map_ok(row)
             .map_err(failure)

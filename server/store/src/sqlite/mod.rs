@@ -31,9 +31,7 @@ use tokio::task::JoinHandle;
 use tracing::{error, warn};
 
 pub use backup::{DatabaseCopy, check_copy, copy_database};
-pub(crate) use contents::{
-    Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
-};
+pub(crate) use contents::{Contents, GameRow, JournalRow, ParticipantRow, TracesRow, UnitHeader};
 pub use errors::FILE as DATABASE_FILE;
 pub use former::LOCK_FILE;
 pub(crate) use former::{forget_move, note_move};

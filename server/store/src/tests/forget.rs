@@ -4,12 +4,12 @@
 use chefshat_engine::{ActionId, Seat};
 use chefshat_record::pseudonym::{Named, Redactions};
 use chefshat_room::journal::{Decided, Marked, ParticipantKind, SeatedParticipant, Source};
+use chefshat_room::testing::participant;
 use chefshat_tournament::{Change as TournamentChange, Entrant};
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{AssertSqlSafe, Connection as _, Executor as _};
 
 use super::*;
 use crate::forget::MAX_REWRITTEN_AT_ONCE;
+use crate::sqlite::tests::edit;
 use crate::tournaments::TournamentEntry;
 
 fn ana() -> Pseudonym {
@@ -42,10 +42,8 @@ fn seated(seat: usize, name: &str) -> Entry {
     at_once(Change::Seated {
         seat: Seat::new(seat),
         participant: Box::new(SeatedParticipant {
-            name: name.into(),
             name_fingerprint: fingerprint_of(name),
-            kind: ParticipantKind::Human,
-            ticket: SecretHash::of(b"ticket"),
+            ..participant(name, ParticipantKind::Human)
         }),
     })
 }
@@ -136,10 +134,8 @@ fn summary_of(header: &GameHeader) -> Box<v1::RecordSummary> {
 #[tokio::test]
 async fn a_participant_is_removed_from_its_games_and_others_stay() {
     with_each_store(async |store| {
-        let (header, [begin, rest]) = game(1);
-        let created = store.create(Arc::clone(&header), begin).await;
-        let mut journal = created.expect("a new game");
-        let mut rest = rest;
+        let (header, [first, mut rest]) = game(1);
+        let mut journal = begin(store, &header, first).await;
         journal.append(&mut rest).await.expect("committed");
         let ended = journal.finish(
             Some(summary_of(&header)),
@@ -148,10 +144,8 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
         ended.await.expect("committed");
         let mut other = created_of_others(store).await;
         finish(&mut other, 2).await;
-        for game in [1, 2] {
-            let written = store.mark_record_written(Id::from_bytes([game; 16]));
-            written.await.expect("committed");
-        }
+        written(store, 1).await;
+        written(store, 2).await;
 
         let forgotten = store.forget(&ana()).await.expect("it is over");
         assert_eq!(forgotten.games, [header.game_id]);
@@ -190,10 +184,6 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
             marked("Anatole laughs"),
         ];
         assert_eq!(format!("{entries:?}"), format!("{expected:?}"));
-        let named = |participant: &str| v1::RecordFilter {
-            participant: participant.into(),
-            ..v1::RecordFilter::default()
-        };
         for (name, games) in [("Ana", 0), ("deleted 1", 1), ("Bo", 1), ("random", 1)] {
             let found = store.list(&named(name), Part::FROM_OLDEST, 9).await;
             assert_eq!(found.expect("readable").len(), games, "{name}");
@@ -205,31 +195,43 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
 }
 
 async fn created_of_others(store: &dyn Store) -> Box<dyn Journal> {
-    let created = store.create(header(2, Durability::Durable), vec![seated(0, "Bo")]);
-    created.await.expect("a new game")
+    begin(
+        store,
+        &header(2, Durability::Durable),
+        vec![seated(0, "Bo")],
+    )
+    .await
+}
+
+/// Plays a game of Ana to its end.
+async fn play(store: &dyn Store, number: u8) -> GameId {
+    let (header, [first, _]) = game(number);
+    let mut journal = begin(store, &header, first).await;
+    end(&mut journal, summary_of(&header)).await;
+    header.game_id
 }
 
 /// Plays more games of Ana to their ends than two transactions rewrite.
 async fn many_games(store: &dyn Store) -> Vec<GameId> {
     let mut games = Vec::new();
     for number in 1..=2 * MAX_REWRITTEN_AT_ONCE + 1 {
-        let (header, [begin, _]) = game(u8::try_from(number).expect("few"));
-        let created = store.create(Arc::clone(&header), begin).await;
-        let mut journal = created.expect("a new game");
-        let ended = journal.finish(Some(summary_of(&header)), None);
-        ended.await.expect("committed");
-        games.push(header.game_id);
+        games.push(play(store, u8::try_from(number).expect("few")).await);
     }
     games
 }
 
+fn named(participant: &str) -> v1::RecordFilter {
+    v1::RecordFilter {
+        participant: participant.into(),
+        ..v1::RecordFilter::default()
+    }
+}
+
 /// The finished games of a participant.
 async fn games_of(store: &dyn Store, name: &str) -> Vec<GameId> {
-    let filter = v1::RecordFilter {
-        participant: name.into(),
-        ..v1::RecordFilter::default()
-    };
-    let found = store.list(&filter, Part::FROM_OLDEST, usize::MAX).await;
+    let found = store
+        .list(&named(name), Part::FROM_OLDEST, usize::MAX)
+        .await;
     let summaries = (found.expect("readable").into_iter()).map(|it| it.summary.expect("readable"));
     summaries
         .map(|it| Id::parse(&it.game_id).expect("an id"))
@@ -249,23 +251,20 @@ async fn repeated(store: &dyn Store, games: &[GameId]) {
 #[tokio::test]
 async fn a_removal_that_fails_is_completed_when_it_is_repeated() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE));
     let store = SqliteStore::open(folder.path()).await.expect("a store");
     let games = many_games(&store).await;
-    let last = hex::encode(games[games.len() - 1].bytes());
-    let mut other = SqliteConnection::connect_with(&file).await.expect("open");
+    let last = games[games.len() - 1];
     let refusing = format!(
         "CREATE TRIGGER refuse BEFORE UPDATE ON games WHEN old.game_id = x'{last}'
          BEGIN SELECT raise(ABORT, 'refused'); END"
     );
-    other.execute(AssertSqlSafe(refusing)).await.expect("done");
+    edit(folder.path(), &refusing).await;
     let refused = store.forget(&ana()).await;
     assert!(matches!(refused, Err(ForgetError::Store(_))), "{refused:?}");
     // After such a failure the store commits nothing more.
     store.close().await;
     drop(store);
-    other.execute("DROP TRIGGER refuse").await.expect("done");
-    other.close().await.expect("closed");
+    edit(folder.path(), "DROP TRIGGER refuse").await;
     let store = SqliteStore::open(folder.path()).await.expect("a store");
     repeated(&store, &games).await;
     store.close().await;
@@ -286,59 +285,29 @@ async fn a_removal_that_fails_is_completed_when_it_is_repeated() {
     store.close().await;
 }
 
-/// Stores a game and a tournament of Ana's that are over.
-async fn game_and_tournament(store: &dyn Store) {
-    let (header, [begin, _]) = game(1);
-    let created = store.create(Arc::clone(&header), begin).await;
-    let mut journal = created.expect("a new game");
-    let ended = journal.finish(Some(summary_of(&header)), None);
-    ended.await.expect("committed");
-    let joined = TournamentEntry::Change(TournamentChange::Joined(entrant()));
-    let closed = TournamentEntry::Change(TournamentChange::Closed);
-    let created = store.create_tournament(Arc::new(cup(7)), vec![joined, closed]);
-    created.await.expect("committed");
-}
-
-/// Once a later version has stored this, removing Ana is refused until it is of this version again.
-async fn refused_of_later(store: &dyn Store, later: &str) {
-    let refused = store.forget(&ana()).await;
-    let is_unreadable = matches!(refused, Err(ForgetError::Unreadable { .. }));
-    assert!(is_unreadable, "{later}: {refused:?}");
-    assert_eq!(games_of(store, "Ana").await.len(), 1, "{later}");
-}
-
 /// What this version does not know of it would be lost.
 #[tokio::test]
 async fn what_a_later_version_has_stored_is_not_written_again() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = SqliteConnectOptions::new().filename(folder.path().join(DATABASE_FILE));
-    let store = SqliteStore::open(folder.path()).await.expect("a store");
-    game_and_tournament(&store).await;
-    let mut other = SqliteConnection::connect_with(&file).await.expect("open");
-    let database = chefshat_postgres::database();
-    let shared = postgres::tests::node(&database).await;
-    game_and_tournament(&shared).await;
-    for table in ["games", "tournaments"] {
-        let [later, present] = [99, form::FORM].map(|it| format!("UPDATE {table} SET form = {it}"));
-        other
-            .execute(AssertSqlSafe(later.clone()))
-            .await
-            .expect("done");
-        refused_of_later(&store, &later).await;
-        other
-            .execute(AssertSqlSafe(present.clone()))
-            .await
-            .expect("done");
-        database.run(&later);
-        refused_of_later(&shared, &later).await;
-        database.run(&present);
-    }
-    other.close().await.expect("closed");
-    for store in [&store as &dyn Store, &shared] {
+    with_each_tables(async |store, tables| {
+        play(store, 1).await;
+        let joined = TournamentEntry::Change(TournamentChange::Joined(entrant()));
+        let closed = TournamentEntry::Change(TournamentChange::Closed);
+        let created = store.create_tournament(Arc::new(cup(7)), vec![joined, closed]);
+        created.await.expect("committed");
+        for table in ["games", "tournaments"] {
+            let [later, present] =
+                [99, form::FORM].map(|it| format!("UPDATE {table} SET form = {it}"));
+            tables.edit(&later).await;
+            let refused = store.forget(&ana()).await;
+            let is_unreadable = matches!(refused, Err(ForgetError::Unreadable { .. }));
+            assert!(is_unreadable, "{later}: {refused:?}");
+            assert_eq!(games_of(store, "Ana").await.len(), 1, "{later}");
+            tables.edit(&present).await;
+        }
         let forgotten = store.forget(&ana()).await.expect("all are over");
         assert_eq!((forgotten.games.len(), forgotten.tournaments), (1, 1));
-        store.close().await;
-    }
+    })
+    .await;
 }
 
 /// Every statement is a round trip to the database, and a transaction must end in time.
@@ -385,21 +354,12 @@ async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
             (2, vec![without_key(seated(0, "Ana"))], other),
         ];
         for (number, mut entries, summary) in games {
-            let created = store.create(header(number, Durability::Durable), Vec::new());
-            let mut journal = created.await.expect("a new game");
+            let mut journal = created(store, number, Durability::Durable).await;
             entries.extend([expressed(0), expressed(1), marked("Ana laughs")]);
             journal.append(&mut entries).await.expect("committed");
-            let ended = journal.finish(Some(summary), None);
-            ended.await.expect("committed");
+            end(&mut journal, summary).await;
         }
-        let games_of = async |name: &str| {
-            let filter = v1::RecordFilter {
-                participant: name.into(),
-                ..v1::RecordFilter::default()
-            };
-            let found = store.list(&filter, Part::FROM_OLDEST, 9).await;
-            found.expect("readable").len()
-        };
+        let games_of = async |name: &str| games_of(store, name).await.len();
         let with_fingerprint = |fingerprint: &str| Pseudonym {
             of: Named {
                 name: "Ana".into(),
@@ -413,7 +373,7 @@ async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
 
         let with_key = with_fingerprint("key of Ana");
         let forgotten = store.forget(&with_key).await.expect("it is over");
-        assert_eq!(forgotten.games, [Id::from_bytes([1; 16])]);
+        assert_eq!(forgotten.games, [id(1)]);
         let redactions = Redactions {
             names: 2,
             expressions: 1,
@@ -442,15 +402,13 @@ async fn a_player_at_a_physical_table_is_removed() {
             display_names: [(0, "Ana".to_owned())].into(),
             ..GameHeader::clone(&header(1, Durability::Durable))
         });
-        let created = store.create(Arc::clone(&at_table), Vec::new()).await;
-        let mut journal = created.expect("a new game");
+        let mut journal = begin(store, &at_table, Vec::new()).await;
         let refused = store.forget(&ana()).await;
         let is_running = matches!(refused, Err(ForgetError::GameRunning(_)));
         assert!(is_running, "its journal does not name her: {refused:?}");
         let mut summary = summary_of(&at_table);
         summary.seats.truncate(2);
-        let ended = journal.finish(Some(summary), None);
-        ended.await.expect("committed");
+        end(&mut journal, summary).await;
         let with_key = Pseudonym {
             of: Named {
                 fingerprint: Some("key of Ana".into()),
@@ -502,23 +460,17 @@ async fn an_imported_record_is_changed_too() {
 #[tokio::test]
 async fn what_is_not_over_prevents_it() {
     with_each_database(async |store| {
-        let (header, [begin, _]) = game(1);
-        let created = store.create(Arc::clone(&header), begin).await;
-        let mut journal = created.expect("a new game");
+        let (header, [first, _]) = game(1);
+        let mut journal = begin(store, &header, first).await;
         let mut over = created_of_others(store).await;
-        over.append(&mut vec![seated(1, "Ana")])
-            .await
-            .expect("committed");
+        let appended = over.append(&mut vec![seated(1, "Ana")]).await;
+        appended.expect("committed");
         finish(&mut over, 2).await;
         let refused = store.forget(&ana()).await;
         assert!(matches!(refused, Err(ForgetError::GameRunning(name)) if name == "Ana"));
-        let stored = store
-            .finished(Id::from_bytes([2; 16]))
-            .await
-            .expect("readable");
+        let stored = store.finished(id(2)).await.expect("readable");
         assert!(format!("{stored:?}").contains("Ana"), "nothing was changed");
-        let ended = journal.finish(Some(summary_of(&header)), None);
-        ended.await.expect("committed");
+        end(&mut journal, summary_of(&header)).await;
 
         let tournament = Arc::new(cup(7));
         let joined = vec![TournamentEntry::Change(TournamentChange::Joined(entrant()))];

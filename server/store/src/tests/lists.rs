@@ -70,155 +70,74 @@ async fn a_game_is_found_by_a_name_of_any_length() {
     .await;
 }
 
+/// What is looked for, after which number, and how many at most; what is found.
+type Case = (fn(&mut v1::RecordFilter), (u64, usize), &'static [u64]);
+
+/// The first games, as many as there are.
+const ALL: (u64, usize) = (0, 9);
+
 async fn check(store: &dyn Store) {
     for game in 1..=5 {
         let header = Arc::new(GameHeader {
             created_at_ms: u64::from(game) * 1_000,
             ..GameHeader::clone(&header(game, Durability::Durable))
         });
-        let mut journal = store
-            .create(Arc::clone(&header), Vec::new())
-            .await
-            .expect("committed");
-        journal
-            .finish(Some(with_seats(&header)), None)
-            .await
-            .expect("committed");
+        let mut journal = begin(store, &header, Vec::new()).await;
+        end(&mut journal, with_seats(&header)).await;
     }
-    let abandoned = {
-        let mut journal = store
-            .create(header(6, Durability::Durable), Vec::new())
-            .await
-            .expect("committed");
-        // Nothing was dealt in it, so it has no record.
-        journal.finish(None, None).await
-    };
-    abandoned.expect("committed");
-    let filter = v1::RecordFilter::default;
-    let robot = v1::ParticipantKind::Robot.into();
-    let human = v1::ParticipantKind::Human.into();
-    let finished = v1::RoomState::Finished.into();
-    let table = [
-        (filter(), 0, 9, vec![1, 2, 3, 4, 5]),
-        (filter(), 0, 2, vec![1, 2]),
-        (filter(), 2, 2, vec![3, 4]),
-        (filter(), 5, 2, vec![]),
-        (
-            v1::RecordFilter {
-                participant: "player of 3".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![3],
-        ),
-        (
-            v1::RecordFilter {
-                participant: "agent of 4".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![4],
-        ),
+    // Nothing was dealt in it, so it has no record.
+    let mut abandoned = created(store, 6, Durability::Durable).await;
+    abandoned.finish(None, None).await.expect("committed");
+    let table: [Case; 15] = [
+        (|_| {}, ALL, &[1, 2, 3, 4, 5]),
+        (|_| {}, (0, 2), &[1, 2]),
+        (|_| {}, (2, 2), &[3, 4]),
+        (|_| {}, (5, 2), &[]),
+        (|it| it.participant = "player of 3".into(), ALL, &[3]),
+        (|it| it.participant = "agent of 4".into(), ALL, &[4]),
         // A built-in agent is found by its agent, not by its display name.
+        (|it| it.participant = "name of 4".into(), ALL, &[]),
+        (|it| it.participant = "player of".into(), ALL, &[]),
         (
-            v1::RecordFilter {
-                participant: "name of 4".into(),
-                ..filter()
+            |it| {
+                it.kind = v1::ParticipantKind::Robot.into();
+                it.state = v1::RoomState::Finished.into();
             },
-            0,
-            9,
-            vec![],
+            (3, 9),
+            &[4, 5],
         ),
+        (|it| it.kind = v1::ParticipantKind::Human.into(), ALL, &[]),
+        (|it| it.state = v1::RoomState::Aborted.into(), ALL, &[]),
+        (|it| it.origin = v1::GameOrigin::Branched.into(), ALL, &[]),
         (
-            v1::RecordFilter {
-                participant: "player of".into(),
-                ..filter()
+            |it| {
+                it.room_name = "game 2".into();
+                it.origin = v1::GameOrigin::Dealt.into();
             },
-            0,
-            9,
-            vec![],
+            ALL,
+            &[2],
         ),
+        (|it| it.room_name = "another".into(), ALL, &[]),
         (
-            v1::RecordFilter {
-                kind: robot,
-                state: finished,
-                ..filter()
+            |it| {
+                it.created_from_ms = 2_000;
+                it.created_before_ms = 4_000;
             },
-            3,
-            9,
-            vec![4, 5],
-        ),
-        (
-            v1::RecordFilter {
-                kind: human,
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                state: v1::RoomState::Aborted.into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                origin: v1::GameOrigin::Branched.into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                room_name: "game 2".into(),
-                origin: v1::GameOrigin::Dealt.into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![2],
-        ),
-        (
-            v1::RecordFilter {
-                room_name: "another".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                created_from_ms: 2_000,
-                created_before_ms: 4_000,
-                ..filter()
-            },
-            0,
-            9,
-            vec![2, 3],
+            ALL,
+            &[2, 3],
         ),
     ];
-    for (filter, after, count, expected) in table {
+    for (set, (after, count), expected) in table {
+        let mut filter = v1::RecordFilter::default();
+        set(&mut filter);
         let part = Part::After(after);
         let listed = store.list(&filter, part, count).await.expect("readable");
         let numbers: Vec<u64> = listed.iter().map(|it| it.number).collect();
         assert_eq!(numbers, expected, "{filter:?}");
         for listed in listed {
             let summary = listed.summary.expect("readable");
-            assert!(
-                crate::matches_filter(&filter, &summary),
-                "{}",
-                listed.number
-            );
+            let matches = crate::matches_filter(&filter, &summary);
+            assert!(matches, "{}", listed.number);
         }
         // In reverse order the same games come, whole or page by page.
         let all = store.list(&filter, Part::FROM_OLDEST, 9).await;

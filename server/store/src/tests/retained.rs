@@ -1,16 +1,16 @@
 //! What retention leaves alone, in each store.
 
-use chefshat_room::ids::{GameId, Id, StudyId, TournamentId};
-use chefshat_room::journal::{GameHeader, StudyGame, TournamentGame};
-use chefshat_room::testing::study_member;
+use chefshat_room::ids::{StudyId, TournamentId};
+use chefshat_room::journal::{SeatLabels, StudyGame, TournamentGame};
+use chefshat_room::testing::study_game;
 use chefshat_tournament::Change as TournamentChange;
 
 use super::*;
 use crate::studies::StudyHeader;
 use crate::tournaments::TournamentEntry;
 
-const TOURNAMENT: TournamentId = TournamentId::from_bytes([7; 16]);
-const STUDY: StudyId = StudyId::from_bytes([8; 16]);
+const TOURNAMENT: TournamentId = id(7);
+const STUDY: StudyId = id(8);
 
 /// What a game is part of.
 #[derive(Clone, Copy)]
@@ -23,16 +23,7 @@ enum Of {
 fn header_of(game: u8, of: Of, durability: Durability) -> Arc<GameHeader> {
     let study = StudyGame {
         study: STUDY,
-        name: "a study".into(),
-        condition: "slow".into(),
-        levels: Default::default(),
-        members: vec![study_member(1, "P1", 0)],
-        group: None,
-        step: 0,
-        practice: false,
-        seed_index: None,
-        attempt: 1,
-        labels: Default::default(),
+        ..study_game(SeatLabels::default())
     };
     Arc::new(GameHeader {
         tournament: matches!(of, Of::Tournament).then_some(TournamentGame {
@@ -46,29 +37,17 @@ fn header_of(game: u8, of: Of, durability: Durability) -> Arc<GameHeader> {
 
 async fn play(store: &dyn Store, game: u8, of: Of, durability: Durability) {
     let header = header_of(game, of, durability);
-    let created = store.create(Arc::clone(&header), vec![entry()]).await;
-    let finished = created
-        .expect("a new game")
-        .finish(Some(summary(&header)), None)
-        .await;
-    finished.expect("committed");
+    let mut journal = begin(store, &header, vec![entry()]).await;
+    end(&mut journal, summary(&header)).await;
     written(store, game).await;
-}
-
-async fn written(store: &dyn Store, game: u8) {
-    let written = store.mark_record_written(Id::from_bytes([game; 16])).await;
-    written.expect("committed");
 }
 
 /// Those of the first five games that are stored.
 async fn stored(store: &dyn Store) -> Vec<u8> {
     let mut stored = Vec::new();
     for game in 1..=5 {
-        let found = store
-            .finished(Id::from_bytes([game; 16]))
-            .await
-            .expect("readable");
-        stored.extend(found.map(|_| game));
+        let found = store.finished(id(game)).await;
+        stored.extend(found.expect("readable").map(|_| game));
     }
     stored
 }
@@ -96,17 +75,11 @@ async fn games_of_what_is_not_over_are_neither_offered_nor_deleted() {
         assert_eq!(prunable(store, newest(1)).await, [3, 4]);
         // One page has no game that may go.
         let found = store.prunable(newest(1), 0, 1).await.expect("readable");
-        assert_eq!(
-            found
-                .iter()
-                .map(|(_, id)| id.bytes()[0])
-                .collect::<Vec<_>>(),
-            [3]
-        );
+        assert_eq!((found.len(), found[0].1), (1, id(3)));
 
-        let all: Vec<GameId> = (1..=4).map(|game| Id::from_bytes([game; 16])).collect();
-        let deleted = store.prune(all.clone()).await.expect("committed");
-        assert_eq!(deleted, [Id::from_bytes([3; 16]), Id::from_bytes([4; 16])]);
+        let all = [1, 2, 3, 4].map(id).to_vec();
+        let deleted = store.prune(all.clone()).await;
+        assert_eq!(deleted, Ok(vec![id(3), id(4)]));
         assert_eq!(stored(store).await, [1, 2, 5]);
         if store.outlives_server() {
             let unwritten = store.without_record_file().await.expect("readable");
@@ -132,11 +105,41 @@ async fn a_deletion_on_purpose_asks_nobody() {
         let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
         created.expect("committed");
         play(store, 1, Of::Tournament, Durability::Durable).await;
-        store
-            .delete(vec![Id::from_bytes([1; 16])])
-            .await
-            .expect("committed");
+        store.delete(vec![id(1)]).await.expect("committed");
         assert_eq!(stored(store).await, [0; 0]);
     })
     .await;
+}
+
+#[tokio::test]
+async fn games_of_what_cannot_be_read_are_kept() {
+    for (damage, kept) in [
+        ("SELECT 1", false),
+        ("UPDATE tournaments SET form = 99", true),
+        // Half of an entry, and of a field.
+        (
+            "UPDATE tournament_entries SET entries = substr(entries, 1, 1)",
+            true,
+        ),
+        ("UPDATE games SET header = substr(header, 1, 1)", true),
+        ("UPDATE games SET form = 99", true),
+    ] {
+        with_each_tables(async |store, tables| {
+            let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
+            created.expect("committed");
+            for game in [1, 2] {
+                play(store, game, Of::Tournament, Durability::Durable).await;
+            }
+            let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
+            let ended = store.append_tournament(TOURNAMENT, 1, end).await;
+            ended.expect("committed");
+            tables.edit(damage).await;
+            let found = prunable(store, Keep::default()).await;
+            assert_eq!(found.is_empty(), kept, "{damage}");
+            store.prune(vec![id(1)]).await.expect("committed");
+            let left = store.finished_games().await;
+            assert_eq!(left, Ok(1 + u64::from(kept)), "{damage}");
+        })
+        .await;
+    }
 }

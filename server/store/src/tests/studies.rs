@@ -9,7 +9,7 @@ use crate::studies::{StudyHeader, changes_to_bytes};
 
 fn header(study: u8) -> Arc<StudyHeader> {
     Arc::new(StudyHeader {
-        id: Id::from_bytes([study; 16]),
+        id: id(study),
         settings: v1::StudySettings {
             name: format!("study {study}"),
             ..v1::StudySettings::default()
@@ -172,7 +172,7 @@ fn traces(number: u32) -> StoredTraces {
     StoredTraces {
         number,
         session: 2,
-        game: Id::from_bytes([9; 16]),
+        game: id(9),
         traces: vec![v1::StudyTrace {
             kind: v1::StudyTraceKind::Hover.into(),
             target: format!("card of {number}"),
@@ -184,47 +184,42 @@ fn traces(number: u32) -> StoredTraces {
 #[tokio::test]
 async fn stored_studies_are_read_back_and_forget_participants() {
     with_each_store(async |store| {
-        let (id, other) = (StudyId::from_bytes([1; 16]), Id::from_bytes([2; 16]));
-        for study in [1, 2] {
-            store.create_study(header(study)).await.expect("committed");
+        let (study, other) = (id(1), id(2));
+        for number in [1, 2] {
+            store.create_study(header(number)).await.expect("committed");
         }
         let taken = store.create_study(header(1)).await;
-        assert_eq!(taken, Err(StoreError::Taken(id.to_string())));
+        assert_eq!(taken, Err(StoreError::Taken(header(1).id.to_string())));
         let changes = every_change();
         let (first, rest) = changes.split_at(4);
         for (row, changes) in [first, rest].into_iter().enumerate() {
-            let appended = store.append_study(id, row as u64, changes.to_vec());
+            let appended = store.append_study(study, row as u64, changes.to_vec());
             appended.await.expect("committed");
         }
         let appended = store.append_study(other, 0, vec![added(1)]);
         appended.await.expect("committed");
         for number in [1, 2, 1] {
-            let appended = store.append_traces(id, traces(number));
+            let appended = store.append_traces(study, traces(number));
             appended.await.expect("committed");
         }
-        let stored = store.study(id).await.expect("readable").expect("stored");
+        let stored = store.study(study).await.expect("readable").expect("stored");
         assert_eq!((stored.changes, stored.rows), (changes, 2));
         assert_eq!(format!("{:?}", stored.header), format!("{:?}", header(1)));
-        assert!(
-            store
-                .study(Id::from_bytes([3; 16]))
-                .await
-                .expect("readable")
-                .is_none()
-        );
+        let missing = store.study(id(3)).await.expect("readable");
+        assert!(missing.is_none());
         let all = [1, 2, 1].map(traces).to_vec();
-        assert_eq!(store.traces(id).await, Ok(all));
+        assert_eq!(store.traces(study).await, Ok(all));
 
-        let rewritten = store.rewrite_study(id, vec![added(2)], vec![1]);
+        let rewritten = store.rewrite_study(study, vec![added(2)], vec![1]);
         rewritten.await.expect("committed");
-        let appended = store.append_study(id, 1, vec![Change::Closed]);
+        let appended = store.append_study(study, 1, vec![Change::Closed]);
         appended.await.expect("committed");
-        let stored = store.study(id).await.expect("readable").expect("stored");
+        let stored = store.study(study).await.expect("readable").expect("stored");
         assert_eq!(
             (stored.changes, stored.rows),
             (vec![added(2), Change::Closed], 2)
         );
-        assert_eq!(store.traces(id).await, Ok(vec![traces(2)]));
+        assert_eq!(store.traces(study).await, Ok(vec![traces(2)]));
         let stored = store.study(other).await.expect("readable").expect("stored");
         assert_eq!((stored.changes, stored.rows), (vec![added(1)], 1));
     })

@@ -25,7 +25,7 @@ async fn stored_tournaments_are_read_back_in_order() {
         }
         let taken = store.create_tournament(numbered(3), Vec::new()).await;
         assert_eq!(taken, Err(StoreError::Taken(numbered(3).id.to_string())));
-        let stored = store.append_tournament(Id::from_bytes([3; 16]), 1, rest.to_vec());
+        let stored = store.append_tournament(id(3), 1, rest.to_vec());
         stored.await.expect("committed");
         let found = store.tournaments(9).await.expect("readable");
         assert_eq!(found.len(), 2);
@@ -54,7 +54,7 @@ async fn newest(store: &dyn Store) {
         (5, None),
     ];
     for (number, end) in ends {
-        let id = Id::from_bytes([number; 16]);
+        let id = id(number);
         let header = numbered(number);
         let begun = vec![change(Change::Begun { rounds: 1 })];
         let made = store.create_tournament(header, begun);

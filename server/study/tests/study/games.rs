@@ -61,7 +61,7 @@ fn practice_reveals_no_condition_outside_blocks() {
     let mut lab = Lab::new(settings, 8);
     for number in 1..=8 {
         let games = lab.complete(number);
-        let slot = lab.study.participant(number).unwrap().slot.unwrap();
+        let slot = lab.participant(number).slot.unwrap();
         let own = lab.study.sequence(slot)[0];
         let conditions: Vec<_> = games.iter().map(|game| game.condition).collect();
         assert_eq!(conditions, [0, own, own]);

@@ -22,6 +22,26 @@ fn end(lab: &mut Lab, number: u32, outcome: Outcome) {
     lab.fold(ended);
 }
 
+/// A game ends for these, with a result.
+fn finish(lab: &mut Lab, numbers: impl IntoIterator<Item = u32>) {
+    let numbers = numbers.into_iter();
+    numbers.for_each(|number| end(lab, number, Outcome::Finished));
+}
+
+/// These begin, then groups are formed.
+fn meet(lab: &mut Lab, numbers: impl IntoIterator<Item = u32>) {
+    numbers.into_iter().for_each(|number| lab.begin(number));
+    lab.wait(0);
+}
+
+/// New participants who are planned to play together.
+fn together(count: usize) -> NewParticipants {
+    NewParticipants {
+        together: true,
+        ..NewParticipants::numbered(count)
+    }
+}
+
 /// Groups: their members by number, with the slot of each.
 fn groups(lab: &Lab) -> BTreeMap<u32, Vec<(u32, u32)>> {
     let mut groups: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
@@ -37,14 +57,14 @@ fn groups(lab: &Lab) -> BTreeMap<u32, Vec<(u32, u32)>> {
 }
 
 fn here(lab: &Lab, number: u32) -> u32 {
-    match lab.study.view(number).unwrap().content {
+    match lab.content(number) {
         Content::Arrival(shown) => shown.here,
         other => panic!("{other:?}"),
     }
 }
 
 fn reason(lab: &Lab, number: u32) -> End {
-    match lab.study.view(number).unwrap().content {
+    match lab.content(number) {
         Content::End { reason, .. } => reason,
         other => panic!("{other:?}"),
     }
@@ -70,10 +90,9 @@ fn those_who_arrive_together_play_the_same_games_in_one_condition() {
         assert_eq!(due.each_ref().map(|it| it.seat), [round, round + 2]);
         assert_eq!(due[0].seed, due[1].seed);
         place(&mut lab, 1);
-        let placed =
-            [1, 3].map(|number| lab.study.participant(number).unwrap().games[round].clone());
+        let placed = [1, 3].map(|number| lab.participant(number).games[round].clone());
         assert_eq!(placed[0].placed.game, placed[1].placed.game);
-        let participant = lab.study.participant(1).unwrap();
+        let participant = lab.participant(1);
         let seats = lab.study.seats_of_group(participant, &placed[0].placed);
         assert_eq!(seats, [round, round + 2]);
         assert_eq!(lab.study.players_of(3), [1, 3]);
@@ -82,14 +101,12 @@ fn those_who_arrive_together_play_the_same_games_in_one_condition() {
                 .iter()
                 .all(|number| lab.study.plays_with_others(*number))
         );
-        for number in [1, 3] {
-            end(&mut lab, number, Outcome::Finished);
-        }
+        finish(&mut lab, [1, 3]);
         // The next game waits for both.
         lab.act(1);
         if round == 0 {
             assert!(lab.place(1).is_empty());
-            let Content::Game(shown) = lab.study.view(1).unwrap().content else {
+            let Content::Game(shown) = lab.content(1) else {
                 panic!("no game");
             };
             assert_eq!(shown.waits_for, 1);
@@ -98,22 +115,15 @@ fn those_who_arrive_together_play_the_same_games_in_one_condition() {
     }
     for number in [1, 3] {
         lab.act(number);
-        assert_eq!(
-            lab.study.participant(number).unwrap().status,
-            Status::Completed
-        );
+        assert_eq!(lab.participant(number).status, Status::Completed);
     }
 }
 
 #[test]
 fn a_plan_says_who_plays_with_whom() {
     let mut lab = Lab::new(in_groups(2), 0);
-    let planned = NewParticipants {
-        together: true,
-        ..NewParticipants::numbered(4)
-    };
-    let added = lab.study.add(&planned).unwrap();
-    lab.fold_all(added);
+    let planned = together(4);
+    lab.invite(&planned);
     lab.add(2);
     for number in [1, 3, 5, 6, 4] {
         lab.begin(number);
@@ -127,19 +137,13 @@ fn a_plan_says_who_plays_with_whom() {
     };
     assert_eq!(members(&lab), [vec![5, 6], vec![3, 4]]);
     // Somebody else comes in place of the one who was planned.
-    let removed = lab.study.remove(2, lab.now_ms).unwrap();
-    lab.fold_all(removed);
-    let replacement = lab.study.replacement(2).unwrap();
-    lab.fold_all(replacement);
+    lab.remove(2);
+    lab.fold_all(lab.study.replacement(2).unwrap());
     lab.begin(7);
     lab.wait(1);
     assert_eq!(members(&lab)[2], [1, 7]);
 
-    let three = NewParticipants {
-        together: true,
-        ..NewParticipants::numbered(3)
-    };
-    assert_eq!(lab.study.add(&three), Err(Refusal::NoWholeGroups(2)));
+    assert_eq!(lab.study.add(&together(3)), Err(Refusal::NoWholeGroups(2)));
     let alone = Lab::new(testing::settings(), 0);
     assert_eq!(alone.study.add(&planned), Err(Refusal::NoWholeGroups(1)));
 }
@@ -151,9 +155,7 @@ fn those_left_over_are_thanked_or_play_with_agents() {
         settings.groups.as_mut().unwrap().left_over = left_over;
         settings.recruiting.completed_url = "https://panel.example/done".to_owned();
         let mut lab = Lab::new(settings, 3);
-        lab.begin(1);
-        lab.begin(2);
-        lab.wait(0);
+        meet(&mut lab, [1, 2]);
         // Only time with an open page counts.
         lab.wait(59_000);
         lab.study.set_connected(2, false, lab.now_ms);
@@ -163,25 +165,24 @@ fn those_left_over_are_thanked_or_play_with_agents() {
         match left_over {
             LeftOverPolicy::Dismiss => {
                 assert_eq!(reason(&lab, 1), End::LeftOver);
-                let Content::End { url, .. } = lab.study.view(1).unwrap().content else {
+                let Content::End { url, .. } = lab.content(1) else {
                     panic!("no end");
                 };
                 assert_eq!(url.as_deref(), Some("https://panel.example/done"));
                 assert_eq!(here(&lab, 2), 1);
                 // Its place is free: two more may begin with the second.
                 assert_eq!(lab.open(3), Ok(()));
-                assert!(lab.study.participant(1).unwrap().slot.is_none());
+                assert!(lab.participant(1).slot.is_none());
             }
             LeftOverPolicy::Agents => {
                 assert_eq!(groups(&lab)[&1], [(1, 0), (2, 1)]);
                 place(&mut lab, 2);
-                let participant = lab.study.participant(2).unwrap();
+                let participant = lab.participant(2);
                 let game = participant.games[0].placed.clone();
                 assert_eq!(lab.study.seats_of_group(participant, &game), [0, 1, 2]);
                 assert_eq!(game.seat, 1);
                 // The third slot of the group is nobody's.
-                lab.begin(3);
-                lab.wait(0);
+                meet(&mut lab, [3]);
                 lab.wait(60_000);
                 assert_eq!(groups(&lab)[&2], [(3, 3)]);
             }
@@ -192,16 +193,11 @@ fn those_left_over_are_thanked_or_play_with_agents() {
 #[test]
 fn a_member_who_leaves_keeps_nobody_waiting() {
     let mut lab = Lab::new(in_groups(2), 4);
-    lab.begin(1);
-    lab.begin(2);
-    lab.wait(0);
+    meet(&mut lab, [1, 2]);
     place(&mut lab, 1);
-    let withdrew = lab.study.withdraw(2, true, lab.now_ms).unwrap();
-    lab.fold_all(withdrew);
+    lab.withdraw(2, true);
     assert!(lab.study.plays_with_others(2) && !lab.study.plays_with_others(1));
-    for number in [1, 2] {
-        end(&mut lab, number, Outcome::Finished);
-    }
+    finish(&mut lab, [1, 2]);
     lab.act(1);
     // The next game has one of them.
     place(&mut lab, 1);
@@ -209,30 +205,20 @@ fn a_member_who_leaves_keeps_nobody_waiting() {
     assert_eq!(lab.study.players_of(1), [1]);
 
     // The slots of a group are given again only after all of it have left.
-    lab.begin(3);
-    lab.begin(4);
-    lab.wait(0);
+    meet(&mut lab, [3, 4]);
     assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
-    let removed = lab.study.remove(1, lab.now_ms).unwrap();
-    lab.fold_all(removed);
+    lab.remove(1);
     lab.add(2);
-    lab.begin(5);
-    lab.begin(6);
-    lab.wait(0);
+    meet(&mut lab, [5, 6]);
     assert_eq!(groups(&lab)[&3], [(5, 0), (6, 1)]);
 }
 
 #[test]
 fn of_a_group_of_three_only_the_late_one_drops_out() {
     let mut lab = Lab::new(in_groups(3), 3);
-    for number in 1..=3 {
-        lab.begin(number);
-    }
-    lab.wait(0);
+    meet(&mut lab, 1..=3);
     place(&mut lab, 1);
-    for number in 1..=3 {
-        end(&mut lab, number, Outcome::Finished);
-    }
+    finish(&mut lab, 1..=3);
     lab.act(1);
     lab.act(3);
     lab.wait(0);
@@ -259,15 +245,10 @@ fn nothing_is_due_while_nobody_is_here_who_waits() {
         .stages
         .insert(4, Stage::once(Task::Games { count: 1 }));
     let mut lab = Lab::new(settings, 3);
-    for number in 1..=3 {
-        lab.begin(number);
-    }
-    lab.wait(0);
+    meet(&mut lab, 1..=3);
     for _ in 0..2 {
         place(&mut lab, 1);
-        for number in 1..=3 {
-            end(&mut lab, number, Outcome::Finished);
-        }
+        finish(&mut lab, 1..=3);
         for number in 1..=3 {
             lab.act(number);
         }
@@ -295,15 +276,14 @@ fn who_is_alone_in_its_group_may_return() {
     let mut settings = in_groups(2);
     settings.groups.as_mut().unwrap().left_over = LeftOverPolicy::Agents;
     let mut lab = Lab::new(settings, 1);
-    lab.begin(1);
-    lab.wait(0);
+    meet(&mut lab, [1]);
     lab.wait(60_000);
     assert_eq!(groups(&lab)[&1], [(1, 0)]);
     lab.study.set_connected(1, false, lab.now_ms);
     lab.wait(60_000);
     assert_eq!(reason(&lab, 1), End::DroppedOut);
     assert_eq!(lab.open(1), Ok(()));
-    assert_eq!(lab.study.participant(1).unwrap().status, Status::Active);
+    assert_eq!(lab.participant(1).status, Status::Active);
 }
 
 #[test]
@@ -311,24 +291,16 @@ fn plans_do_not_take_each_others_places() {
     let mut settings = in_groups(2);
     settings.participants = 4;
     let mut lab = Lab::new(settings, 0);
-    let planned = NewParticipants {
-        together: true,
-        ..NewParticipants::numbered(6)
-    };
-    let added = lab.study.add(&planned).unwrap();
-    lab.fold_all(added);
+    lab.invite(&together(6));
     lab.begin(1);
     lab.begin(3);
     // Two pairs are expected: there is a place for their others, and for nobody else.
     assert_eq!(lab.open(5), Err(Refusal::Full));
-    lab.begin(2);
-    lab.begin(4);
-    lab.wait(0);
+    meet(&mut lab, [2, 4]);
     assert_eq!(groups(&lab).len(), 2);
     // In place of one whose group is formed comes somebody who may play with anybody.
-    let replacement = lab.study.replacement(2).unwrap();
-    lab.fold_all(replacement);
-    assert_eq!(lab.study.participant(7).unwrap().planned, None);
+    lab.fold_all(lab.study.replacement(2).unwrap());
+    assert_eq!(lab.participant(7).planned, None);
 }
 
 #[test]
@@ -343,11 +315,9 @@ fn nobody_waits_where_no_slots_are_left() {
     };
     away(&mut lab, 3);
     // Two come alone, one after the other, and play with agents.
-    lab.begin(1);
-    lab.wait(0);
+    meet(&mut lab, [1]);
     lab.wait(60_000);
-    lab.begin(2);
-    lab.wait(0);
+    meet(&mut lab, [2]);
     lab.wait(59_000);
     away(&mut lab, 4);
     lab.wait(1_000);
@@ -363,13 +333,9 @@ fn nobody_waits_where_no_slots_are_left() {
 #[test]
 fn a_member_for_whom_the_others_wait_too_long_has_dropped_out() {
     let mut lab = Lab::new(in_groups(2), 2);
-    lab.begin(1);
-    lab.begin(2);
-    lab.wait(0);
+    meet(&mut lab, [1, 2]);
     place(&mut lab, 1);
-    for number in [1, 2] {
-        end(&mut lab, number, Outcome::Finished);
-    }
+    finish(&mut lab, [1, 2]);
     lab.act(1);
     lab.wait(0);
     assert_eq!(lab.wake_in(), Some(60_000));
@@ -397,8 +363,7 @@ fn nobody_begins_for_whom_there_is_no_place() {
     assert_eq!(groups(&lab)[&1], [(1, 0), (2, 1)]);
     assert_eq!(lab.study.consent(lab.at(3), lab.now_ms), Err(Refusal::Full));
     for number in [1, 2] {
-        let removed = lab.study.remove(number, lab.now_ms).unwrap();
-        lab.fold_all(removed);
+        lab.remove(number);
     }
     lab.act(3);
     assert_eq!(here(&lab, 3), 1);
@@ -407,25 +372,18 @@ fn nobody_begins_for_whom_there_is_no_place() {
 #[test]
 fn a_test_participant_goes_on_alone() {
     let mut lab = Lab::new(in_groups(2), 1);
-    let added = lab.study.add(&tests(3)).unwrap();
-    lab.fold_all(added);
-    for number in [1, 2] {
-        lab.begin(number);
-    }
-    lab.wait(0);
+    lab.invite(&tests(3));
+    meet(&mut lab, [1, 2]);
     assert_eq!([1, 2].map(|number| here(&lab, number)), [1, 1]);
     let at = lab.at(1);
     assert_eq!(
         lab.study.proceed(at, lab.now_ms),
         Err(Refusal::StepMismatch)
     );
-    let grouped = lab.study.proceed(lab.at(2), lab.now_ms).unwrap();
-    lab.fold(grouped);
+    let grouped = lab.study.proceed(lab.at(2), lab.now_ms);
+    lab.fold(grouped.unwrap());
     assert_eq!(groups(&lab)[&1], [(2, 0)]);
-    for number in [3, 4] {
-        lab.begin(number);
-    }
-    lab.wait(0);
+    meet(&mut lab, [3, 4]);
     assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
     // Nor does its game wait for another test participant any longer, if it continues.
     lab.study.set_connected(4, false, lab.now_ms);
@@ -443,12 +401,10 @@ fn practice_is_played_alone() {
         .stages
         .insert(2, Stage::once(Task::Practice { in_data: false }));
     let mut lab = Lab::new(settings, 2);
-    lab.begin(1);
-    lab.begin(2);
-    lab.wait(0);
+    meet(&mut lab, [1, 2]);
     place(&mut lab, 1);
     assert!(lab.study.due(1).is_none() && lab.study.due(2).is_some());
-    let participant = lab.study.participant(1).unwrap();
+    let participant = lab.participant(1);
     let practice = participant.games[0].placed.clone();
     assert_eq!(
         lab.study.seats_of_group(participant, &practice),
@@ -492,7 +448,7 @@ fn happen(lab: &mut Lab, (kind, who): (u8, u32)) {
         0 => lab.add(1),
         1..=4 => drop(lab.open(number)),
         5..=11 if is_active => {
-            let running = lab.study.participant(number).unwrap().games.last();
+            let running = lab.participant(number).games.last();
             let running = running
                 .filter(|it| it.ended.is_none())
                 .map(|it| it.placed.game);
@@ -538,14 +494,12 @@ fn check(lab: &Lab) {
         assert_eq!(slots.len(), members.len(), "two members have one slot");
         let units: BTreeSet<u32> = slots.iter().map(|slot| slot / size).collect();
         assert_eq!(units.len(), 1, "the slots of group {group} are apart");
-        let holds = |number: &u32| lab.study.participant(*number).unwrap().holds_slot();
+        let holds = |number: &u32| lab.participant(*number).holds_slot();
         if members.iter().any(|(number, _)| holds(number)) {
             assert!(holders.insert(units), "two groups hold the same slots");
         }
         // Those who are in the middle of it play the same game, or wait for each other.
-        let active = members
-            .iter()
-            .map(|(number, _)| lab.study.participant(*number).unwrap());
+        let active = members.iter().map(|(number, _)| lab.participant(*number));
         let active: Vec<_> = active.filter(|it| it.status == Status::Active).collect();
         let games: BTreeSet<_> = active
             .iter()

@@ -11,11 +11,11 @@ use chefshat_study::{
 use super::support::{Lab, device, tests};
 
 fn status(lab: &Lab, number: u32) -> Status {
-    lab.study.participant(number).unwrap().status
+    lab.participant(number).status
 }
 
 fn slot(lab: &Lab, number: u32) -> Option<u32> {
-    lab.study.participant(number).unwrap().slot
+    lab.participant(number).slot
 }
 
 fn named(names: &[String]) -> NewParticipants {
@@ -40,7 +40,7 @@ fn a_participant_completes_all_steps() {
     assert_eq!((status(&lab, 1), slot(&lab, 1)), (Status::Invited, None));
     let games = lab.complete(1);
     assert_eq!(games.len(), 5);
-    let participant = lab.study.participant(1).unwrap();
+    let participant = lab.participant(1);
     assert_eq!(participant.status, Status::Completed);
     assert_eq!(participant.reached_at_ms.len(), lab.study.step_count() + 1);
     assert_eq!(participant.answers.len(), 2);
@@ -51,7 +51,7 @@ fn a_participant_completes_all_steps() {
     );
     // printf 'I take part.' | sha256sum
     assert_eq!(consent.text_sha256[..4], [0x80, 0xf3, 0x13, 0x13]);
-    assert_eq!(lab.study.view(1).unwrap().content, over(End::Completed));
+    assert_eq!(lab.content(1), over(End::Completed));
     assert!(lab.folded_again() == lab.study);
 }
 
@@ -80,9 +80,9 @@ fn the_newest_session_wins_and_repeated_commands_change_nothing() {
     lab.complete(1);
     assert_eq!(lab.study.proceed(lab.at(1), 0), Err(Refusal::Over));
     // The link still shows the end, without a new session.
-    let sessions = lab.study.participant(1).unwrap().session;
+    let sessions = lab.participant(1).session;
     lab.open(1).unwrap();
-    assert_eq!(lab.study.participant(1).unwrap().session, sessions);
+    assert_eq!(lab.participant(1).session, sessions);
 }
 
 #[test]
@@ -99,8 +99,7 @@ fn on_another_device_nothing_begins_and_nothing_is_taken() {
         },
         1,
     );
-    let added = lab.study.add(&tests(2)).unwrap();
-    lab.fold_all(added);
+    lab.invite(&tests(2));
     let with = |pointer| Device {
         pointer: Some(pointer),
         ..device()
@@ -116,7 +115,7 @@ fn on_another_device_nothing_begins_and_nothing_is_taken() {
     lab.fold_all(change);
     // On another device it does not continue either, and the first session stays the newest.
     assert_eq!(opened(&lab, 1, Some(with(Pointer::Fine))), refused);
-    assert_eq!(lab.study.participant(1).unwrap().session, 1);
+    assert_eq!(lab.participant(1).session, 1);
     lab.complete(1);
     assert_eq!(opened(&lab, 1, None), Ok(None));
 
@@ -157,7 +156,7 @@ fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again()
         (status(&lab, 1), slot(&lab, 1), lab.at(1).step),
         (Status::Active, Some(0), 1)
     );
-    assert_eq!(lab.study.participant(1).unwrap().ended_at_ms, None);
+    assert_eq!(lab.participant(1).ended_at_ms, None);
 
     // A restart: nobody is connected, and the time counts from then.
     lab.study = lab.folded_again();
@@ -168,7 +167,7 @@ fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again()
     assert_eq!(slot(&lab, 2), Some(0));
     lab.open(1).unwrap();
     assert_eq!(status(&lab, 1), Status::DroppedOut);
-    assert_eq!(lab.study.view(1).unwrap().content, over(End::DroppedOut));
+    assert_eq!(lab.content(1), over(End::DroppedOut));
     assert_eq!(lab.study.consent(lab.at(1), 0), Err(Refusal::Over));
 }
 
@@ -182,33 +181,23 @@ fn withdrawing_is_always_possible_and_does_what_it_says() {
     lab.wait(500);
     lab.fold(lab.study.close().unwrap());
     for number in 1..=3 {
-        let withdrew = lab
-            .study
-            .withdraw(number, false, lab.now_ms)
-            .unwrap()
-            .unwrap();
-        lab.fold(withdrew);
+        lab.withdraw(number, false);
         assert_eq!(status(&lab, number), Status::Withdrawn);
         assert_eq!(lab.study.withdraw(number, false, lab.now_ms), Ok(None));
-        assert_eq!(
-            lab.study.view(number).unwrap().content,
-            over(End::Withdrawn)
-        );
+        assert_eq!(lab.content(number), over(End::Withdrawn));
     }
-    let kept = lab.study.participant(1).unwrap();
+    let kept = lab.participant(1);
     assert_eq!((kept.answers.len(), kept.pseudonym.as_str()), (2, "P01"));
 
-    let deleted = lab.study.withdraw(1, true, lab.now_ms).unwrap().unwrap();
-    lab.fold(deleted);
+    lab.withdraw(1, true);
     assert_eq!(lab.study.withdraw(1, true, lab.now_ms), Ok(None));
-    let participant = lab.study.participant(1).unwrap();
+    let participant = lab.participant(1);
     assert!(participant.answers.is_empty() && participant.pseudonym.is_empty());
     assert!(participant.consent.is_some() && participant.games.len() == 5);
-    assert_eq!(lab.study.view(1).unwrap().content, over(End::DataDeleted));
+    assert_eq!(lab.content(1), over(End::DataDeleted));
 
     // The stored changes lose the data too, and fold to the same study.
-    let stored_again = lab.changes.iter_mut().map(|change| change.forget(1));
-    assert_eq!(stored_again.filter(|changed| *changed).count(), 4);
+    assert_eq!(lab.forget(1), 4);
     let text = format!("{:?}", lab.changes);
     assert!(!text.contains("P01") && text.contains("P02") && !text.contains("Number("));
     assert!(lab.folded_again() == lab.study);
@@ -218,14 +207,12 @@ fn withdrawing_is_always_possible_and_does_what_it_says() {
 fn a_slot_is_given_again_first() {
     let mut lab = Lab::new(settings(), 6);
     (1..=3).for_each(|number| lab.begin(number));
-    let withdrew = lab.study.withdraw(2, false, 0).unwrap().unwrap();
-    lab.fold(withdrew);
-    let removed = lab.study.remove(1, 0).unwrap().unwrap();
-    lab.fold(removed);
+    lab.withdraw(2, false);
+    lab.remove(1);
     assert_eq!(lab.study.remove(1, 0), Ok(None));
     assert_eq!(lab.study.remove(2, 0), Err(Refusal::Over));
     assert_eq!(lab.open(1), Ok(()));
-    assert_eq!(lab.study.view(1).unwrap().content, over(End::Removed));
+    assert_eq!(lab.content(1), over(End::Removed));
     assert!(lab.study.withdraw(1, true, 0).unwrap().is_some());
     (4..=6).for_each(|number| lab.begin(number));
     let slots: Vec<_> = (3..=6).map(|number| slot(&lab, number)).collect();
@@ -245,8 +232,7 @@ fn who_does_not_consent_takes_no_slot() {
     assert_eq!(slot(&lab, 2), Some(0));
     let full = lab.study.consent(lab.at(1), lab.now_ms);
     assert_eq!(full, Err(Refusal::Full));
-    let withdrew = lab.study.withdraw(2, false, 0).unwrap().unwrap();
-    lab.fold(withdrew);
+    lab.withdraw(2, false);
     lab.act(1);
     assert_eq!(slot(&lab, 1), Some(0));
     assert!(lab.folded_again() == lab.study);
@@ -276,11 +262,10 @@ fn who_completed_the_study_has_done_so_without_data_too_but_its_slot_is_free() {
     lab.open(1).unwrap();
     lab.complete(1);
     assert_eq!(lab.open(2), Err(Refusal::Full));
-    let deleted = lab.study.withdraw(1, true, lab.now_ms).unwrap().unwrap();
-    lab.fold(deleted);
+    lab.withdraw(1, true);
     assert_eq!(lab.study.withdraw(1, true, lab.now_ms), Ok(None));
     assert_eq!(status(&lab, 1), Status::Completed);
-    assert!(lab.study.participant(1).unwrap().answers.is_empty());
+    assert!(lab.participant(1).answers.is_empty());
     let view = lab.study.view(1).unwrap();
     assert_eq!(view.content, over(End::DataDeleted));
     lab.open(2).unwrap();
@@ -363,9 +348,7 @@ fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
 fn pseudonyms_are_unique_and_follow_from_numbers() {
     let mut lab = Lab::new(settings(), 1);
     let names = ["p04", "", "", "Ada"].map(str::to_owned);
-    for change in lab.study.add(&named(&names)).unwrap() {
-        lab.fold(change);
-    }
+    lab.invite(&named(&names));
     let participants = lab.study.participants().values();
     let pseudonyms: Vec<_> = participants.map(|it| it.pseudonym.as_str()).collect();
     assert_eq!(pseudonyms, ["P01", "p04", "P03", "P05", "Ada"]);
@@ -385,12 +368,10 @@ fn test_participants_take_no_slot_from_others_and_may_go_on_without_answers() {
     let mut settings = within(2);
     settings.participants = 2;
     let mut lab = Lab::new(settings, 1);
-    for change in lab.study.add(&tests(3)).unwrap() {
-        lab.fold(change);
-    }
+    lab.invite(&tests(3));
     lab.add(2);
     let of = |lab: &Lab, number| {
-        let participant = lab.study.participant(number).unwrap();
+        let participant = lab.participant(number);
         (
             participant.pseudonym.clone(),
             participant.slot,
@@ -415,25 +396,20 @@ fn test_participants_take_no_slot_from_others_and_may_go_on_without_answers() {
     assert_eq!(lab.open(6), Err(Refusal::Full));
     // The conditions of a slot are the same in a test.
     let conditions = |number| {
-        let participant = lab.study.participant(number).unwrap();
+        let participant = lab.participant(number);
         lab.study.sequence_of(participant)
     };
     assert_eq!(conditions(2), conditions(1));
     assert_eq!(lab.folded_again(), lab.study);
 
     // A questionnaire is passed over in a test alone.
-    for change in lab.study.add(&tests(1)).unwrap() {
-        lab.fold(change);
-    }
+    lab.invite(&tests(1));
     let mut skipped = Vec::new();
     for number in [1, 7] {
         if number == 7 {
             lab.begin(number);
         }
-        while !matches!(
-            lab.study.view(number).unwrap().content,
-            Content::Questionnaire(_)
-        ) {
+        while !matches!(lab.content(number), Content::Questionnaire(_)) {
             lab.act(number);
         }
         skipped.push(lab.study.proceed(lab.at(number), 0).is_ok());

@@ -267,8 +267,8 @@ fn earlier_answers_decide_what_is_shown() {
         ];
         let mut given = Some(given);
         let mut reached = vec![0];
-        while lab.study.participant(1).unwrap().ended_at_ms.is_none() {
-            match lab.study.view(1).unwrap().content {
+        while lab.participant(1).ended_at_ms.is_none() {
+            match lab.content(1) {
                 Content::Questionnaire(shown) if lab.at(1).step == 3 => {
                     let shown: Vec<usize> = shown.items.iter().map(|it| it.item).collect();
                     assert_eq!(shown, items);
@@ -280,16 +280,14 @@ fn earlier_answers_decide_what_is_shown() {
                     let text = "item 3: it is not shown after these answers";
                     assert_eq!(hidden.to_string(), text);
                     answers.pop();
-                    let answered = lab.study.answer(lab.at(1), answers, 0).unwrap();
-                    lab.fold(answered);
+                    lab.answer(1, answers);
                     let mut met = items.clone();
                     met.pop();
                     assert_eq!(lab.study.shown_items(1, 3), Some(met));
                 }
                 Content::Questionnaire(_) => {
                     let given = given.take().unwrap();
-                    let answered = lab.study.answer(lab.at(1), given, 0).unwrap();
-                    lab.fold(answered);
+                    lab.answer(1, given);
                 }
                 _ => drop(lab.act(1)),
             }
@@ -299,16 +297,13 @@ fn earlier_answers_decide_what_is_shown() {
             }
         }
         assert_eq!(reached, steps, "{age} {plays:?}");
-        let participant = lab.study.participant(1).unwrap();
+        let participant = lab.participant(1);
         assert_eq!(participant.status, Status::Completed);
         assert_eq!(participant.reached_at_ms.len(), 7);
         assert_eq!(lab.folded_again(), lab.study);
         // The journal without the answers leads to the same steps.
-        let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
-        lab.fold(deleted);
-        for change in &mut lab.changes {
-            change.forget(1);
-        }
+        lab.withdraw(1, true);
+        lab.forget(1);
         assert_eq!(lab.folded_again(), lab.study);
     }
 }
@@ -344,11 +339,10 @@ fn screening_out_ends_a_participation_and_frees_its_slot() {
     let answered = |lab: &mut Lab, number, age| {
         lab.begin(number);
         let age = vec![answer(0, Answer::Number(age))];
-        let change = lab.study.answer(lab.at(number), age, lab.now_ms).unwrap();
-        lab.fold(change);
+        lab.answer(number, age);
     };
     answered(&mut lab, 1, 17);
-    let participant = lab.study.participant(1).unwrap();
+    let participant = lab.participant(1);
     assert_eq!(participant.status, Status::ScreenedOut);
     assert_eq!(participant.ended_at_ms, Some(lab.now_ms));
     assert!(
@@ -360,27 +354,24 @@ fn screening_out_ends_a_participation_and_frees_its_slot() {
         url: Some(url.to_owned()),
         text: text.to_owned(),
     };
-    let content = |lab: &Lab| lab.study.view(1).unwrap().content;
+    let content = |lab: &Lab| lab.content(1);
     assert_eq!(content(&lab), end("https://panel.example/left", &text));
     assert_eq!(lab.study.proceed(lab.at(1), 0), Err(Refusal::Over));
 
     // The slot is for the next one, who goes on.
     answered(&mut lab, 2, 18);
-    assert_eq!(lab.study.participant(2).unwrap().slot, Some(0));
+    assert_eq!(lab.participant(2).slot, Some(0));
     lab.complete(2);
-    let participant = lab.study.participant(2).unwrap();
+    let participant = lab.participant(2);
     assert_eq!(participant.status, Status::Completed);
     assert_eq!(participant.passed_over, [2].into());
     assert_eq!(lab.folded_again(), lab.study);
 
     // Its data are deleted at its wish; the journal without them leads to the same state.
-    let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
-    lab.fold(deleted);
-    let participant = lab.study.participant(1).unwrap();
+    lab.withdraw(1, true);
+    let participant = lab.participant(1);
     assert_eq!(participant.status, Status::ScreenedOut);
-    for change in &mut lab.changes {
-        change.forget(1);
-    }
+    lab.forget(1);
     assert_eq!(lab.folded_again(), lab.study);
 
     // It has an address of its own, and needs answers.
@@ -444,7 +435,7 @@ fn in_a_block_the_answers_of_other_conditions_do_not_count() {
     ] {
         let mut lab = Lab::new(settings.clone(), 1);
         lab.open(1).unwrap();
-        while lab.study.participant(1).unwrap().ended_at_ms.is_none() {
+        while lab.participant(1).ended_at_ms.is_none() {
             let at = lab.at(1);
             let given = match at.step {
                 0 => answers[0],
@@ -457,10 +448,9 @@ fn in_a_block_the_answers_of_other_conditions_do_not_count() {
             };
             let given = given.map(|number| answer(0, Answer::Number(number)));
             let given = Vec::from_iter(given);
-            let answered = lab.study.answer(at, given, 0).unwrap();
-            lab.fold(answered);
+            lab.answer(1, given);
         }
-        let participant = lab.study.participant(1).unwrap();
+        let participant = lab.participant(1);
         assert_eq!(
             participant.passed_over,
             passed_over.iter().copied().collect()
@@ -499,10 +489,9 @@ fn an_attention_check_is_passed_by_its_answers_and_no_others() {
             answer(1, Answer::Options(vec![2])),
             answer(2, Answer::Options(chosen)),
         ];
-        let answered = lab.study.answer(lab.at(1), given, 0).unwrap();
-        lab.fold(answered);
+        lab.answer(1, given);
         // One of both checks is passed where none or all options are right.
-        let participant = lab.study.participant(1).unwrap();
+        let participant = lab.participant(1);
         assert_eq!(lab.study.attention_checks(participant), (2, 1));
     }
 }
@@ -523,7 +512,7 @@ fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
     let mut lab = Lab::new(settings, 1);
     lab.open(1).unwrap();
     let number = |item, value| answer(item, Answer::Number(value));
-    let saved = |lab: &Lab| lab.study.participant(1).unwrap().saved_answers.to_vec();
+    let saved = |lab: &Lab| lab.participant(1).saved_answers.to_vec();
     let save = |lab: &mut Lab, answers: &[ItemAnswer]| {
         let change = lab.study.save(lab.at(1), answers.to_vec())?;
         lab.fold(change);
@@ -560,10 +549,9 @@ fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
     let late = lab.study.save(first_step, second.to_vec());
     assert_eq!(late, Err(Refusal::StepOver));
     while save(&mut lab, &second).is_ok() {}
-    assert_eq!(lab.study.participant(1).unwrap().saves, MAX_SAVES);
+    assert_eq!(lab.participant(1).saves, MAX_SAVES);
     assert_eq!(save(&mut lab, &second), Err(Refusal::TooManySaves));
-    let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
-    lab.fold(deleted);
+    lab.withdraw(1, true);
     assert_eq!(saved(&lab), []);
     let forgotten = lab.changes.iter_mut().filter_map(|change| {
         change.forget(1);
@@ -587,8 +575,8 @@ fn each_participant_has_an_order_of_its_own_that_stays() {
         let mut orders = BTreeSet::new();
         for number in 1..=6 {
             lab.open(number).unwrap();
-            while lab.study.participant(number).unwrap().ended_at_ms.is_none() {
-                if let Content::Questionnaire(shown) = lab.study.view(number).unwrap().content {
+            while lab.participant(number).ended_at_ms.is_none() {
+                if let Content::Questionnaire(shown) = lab.content(number) {
                     let order: Vec<usize> = shown.items.iter().map(|it| it.item).collect();
                     let step = lab.at(number).step;
                     assert_eq!(lab.study.item_order(number, step).as_ref(), Some(&order));

@@ -139,7 +139,7 @@ fn without_a_panel_an_id_is_not_kept() {
 
 #[test]
 fn participants_go_on_where_the_panel_says() {
-    let end = |lab: &Lab, number| match lab.study.view(number).unwrap().content {
+    let end = |lab: &Lab, number| match lab.content(number) {
         Content::End { reason, url, .. } => (reason, url),
         content => panic!("it is not over: {content:?}"),
     };

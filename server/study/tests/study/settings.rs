@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use chefshat_study::testing::{condition, consent, settings, text, within};
 use chefshat_study::{
     AnswerSet, ExternalQuestionnaire, Factor, Item, ItemKind, Language, Part, Questionnaire,
-    Settings, ShownIf, Stage, Study, Task, Template, Text,
+    Settings, ShownIf, Stage, Study, Task, Template,
 };
 
 fn check(field: &str, start: Settings, change: impl FnOnce(&mut Settings)) {
@@ -15,17 +15,22 @@ fn check(field: &str, start: Settings, change: impl FnOnce(&mut Settings)) {
     assert_eq!(problem.field, field, "{problem}");
 }
 
-fn item(kind: ItemKind) -> Stage {
-    Stage::once(Task::Questionnaire(Questionnaire {
-        id: "q".to_owned(),
+fn questionnaire(id: &str, items: Vec<Item>, shuffled: bool) -> Task {
+    Task::Questionnaire(Questionnaire {
+        id: id.to_owned(),
         title: String::new(),
         instructions: String::new(),
-        items: vec![Item {
-            required: false,
-            ..Item::new("i", "?", kind)
-        }],
-        shuffled: false,
-    }))
+        items,
+        shuffled,
+    })
+}
+
+fn item(kind: ItemKind) -> Stage {
+    let item = Item {
+        required: false,
+        ..Item::new("i", "?", kind)
+    };
+    Stage::once(questionnaire("q", vec![item], false))
 }
 
 fn slider(min: i32, max: i32, step: u32) -> Stage {
@@ -236,15 +241,6 @@ fn a_problem_of_an_item_names_its_field() {
 
 #[test]
 fn a_problem_of_a_condition_names_its_field() {
-    let questionnaire = |id: &str, items: Vec<Item>, shuffled| {
-        Task::Questionnaire(Questionnaire {
-            id: id.to_owned(),
-            title: String::new(),
-            instructions: String::new(),
-            items,
-            shuffled,
-        })
-    };
     let number = |min, max| ItemKind::Number {
         min,
         max,
@@ -276,12 +272,6 @@ fn a_problem_of_a_condition_names_its_field() {
         not: false,
     };
     let part = |task, shown_if| Stage::Once(Part { task, shown_if });
-    let text = || {
-        Task::Text(Text {
-            title: String::new(),
-            text: "x".to_owned(),
-        })
-    };
     let check_part = |field: &str, stage: Stage| {
         check(&format!("stages[2].{field}"), settings(), |it| {
             it.stages[1] = Stage::once(earlier.clone());

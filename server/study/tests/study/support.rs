@@ -2,7 +2,7 @@
 
 use chefshat_study::{
     Answer, At, Change, Content, Device, DueGame, ItemAnswer, ItemKind, NewParticipants, Outcome,
-    Pointer, Refusal, Settings, Study,
+    Participant, Pointer, Refusal, Settings, Study,
 };
 
 pub(crate) struct Lab {
@@ -58,8 +58,32 @@ impl Lab {
     }
 
     pub(crate) fn add(&mut self, count: usize) {
-        let added = self.study.add(&NewParticipants::numbered(count)).unwrap();
-        self.fold_all(added);
+        self.invite(&NewParticipants::numbered(count));
+    }
+
+    pub(crate) fn invite(&mut self, participants: &NewParticipants) {
+        self.fold_all(self.study.add(participants).unwrap());
+    }
+
+    pub(crate) fn answer(&mut self, number: u32, answers: Vec<ItemAnswer>) {
+        let answered = self.study.answer(self.at(number), answers, self.now_ms);
+        self.fold(answered.unwrap());
+    }
+
+    pub(crate) fn withdraw(&mut self, number: u32, delete_data: bool) {
+        let withdrew = self.study.withdraw(number, delete_data, self.now_ms);
+        self.fold(withdrew.unwrap().unwrap());
+    }
+
+    pub(crate) fn remove(&mut self, number: u32) {
+        let removed = self.study.remove(number, self.now_ms);
+        self.fold(removed.unwrap().unwrap());
+    }
+
+    /// Removes the data of a participant from the changes. Returns how many contained some.
+    pub(crate) fn forget(&mut self, number: u32) -> usize {
+        let changed = self.changes.iter_mut().map(|change| change.forget(number));
+        changed.filter(|changed| *changed).count()
     }
 
     pub(crate) fn open(&mut self, number: u32) -> Result<(), Refusal> {
@@ -93,9 +117,18 @@ impl Lab {
         self.study.wake_in(self.now_ms, self.now_ms)
     }
 
+    pub(crate) fn participant(&self, number: u32) -> &Participant {
+        self.study.participant(number).unwrap()
+    }
+
+    /// What a participant sees.
+    pub(crate) fn content(&self, number: u32) -> Content {
+        self.study.view(number).unwrap().content
+    }
+
     /// Where a participant is.
     pub(crate) fn at(&self, number: u32) -> At {
-        let participant = self.study.participant(number).unwrap();
+        let participant = self.participant(number);
         At {
             number,
             session: participant.session,
@@ -107,7 +140,7 @@ impl Lab {
     pub(crate) fn act(&mut self, number: u32) -> Option<DueGame> {
         let due = self.study.due(number);
         let (at, now_ms) = (self.at(number), self.now_ms);
-        let change = match self.study.view(number).unwrap().content {
+        let change = match self.content(number) {
             Content::Consent(_) => match self.study.consent(at, now_ms) {
                 Err(Refusal::Full) => return None,
                 consented => consented.unwrap(),
@@ -137,14 +170,14 @@ impl Lab {
     /// The changes by which the due game of a participant, and of its group, begins.
     pub(crate) fn place(&self, number: u32) -> Vec<Change> {
         // Every game has its own id: there are fewer than 256 changes of a participant in a test.
-        let games = self.study.participant(number).unwrap().games.len() as u8;
+        let games = self.participant(number).games.len() as u8;
         let game = [games, number as u8].repeat(8).try_into().unwrap();
         self.study.place(number, [9; 16], game)
     }
 
     /// The change by which a participant's running game ends.
     pub(crate) fn ended(&self, number: u32, outcome: Outcome) -> Change {
-        let games = &self.study.participant(number).unwrap().games;
+        let games = &self.participant(number).games;
         let game = games.last().unwrap().placed.game;
         let ended = self.study.game_ended(number, game, outcome, self.now_ms);
         ended.unwrap()
@@ -154,13 +187,7 @@ impl Lab {
     pub(crate) fn complete(&mut self, number: u32) -> Vec<DueGame> {
         self.open(number).unwrap();
         let mut games = Vec::new();
-        while self
-            .study
-            .participant(number)
-            .unwrap()
-            .ended_at_ms
-            .is_none()
-        {
+        while self.participant(number).ended_at_ms.is_none() {
             games.extend(self.act(number));
         }
         games

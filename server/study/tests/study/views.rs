@@ -88,7 +88,7 @@ fn a_pseudonym_cannot_add_to_the_address_of_an_external_questionnaire() {
         lab.fold(change);
     }
     lab.open(1).unwrap();
-    let Content::External(external) = lab.study.view(1).unwrap().content else {
+    let Content::External(external) = lab.content(1) else {
         panic!("it is the first step");
     };
     let expected = "https://example.org/?p=a%26x%3D2%20%C3%A8%7Bparticipant%7D&x=1";

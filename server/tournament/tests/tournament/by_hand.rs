@@ -9,23 +9,16 @@ use chefshat_tournament::{
 };
 
 use super::support::{
-    begun, end, entrant, follow, joined, play_through, played, played_by_number, settings,
+    NO_SHOW_MS, begin, begun, end, entrant, follow, joined, line_of, order, play, play_in_turn,
+    play_through, played, played_by_number, settings, two_tables,
 };
 
-const NO_SHOW_MS: u64 = 1000;
-
-fn fold(tournament: &mut Tournament, change: Change) {
-    tournament.fold(&change);
-}
-
 fn withdraw(tournament: &mut Tournament, who: usize) {
-    let change = tournament.withdraw(who, Leaving::Itself).unwrap().unwrap();
-    fold(tournament, change);
+    tournament.fold(&tournament.withdraw(who, Leaving::Itself).unwrap().unwrap());
 }
 
 fn pause(tournament: &mut Tournament, paused: bool) {
-    let change = tournament.set_paused(paused).unwrap().unwrap();
-    fold(tournament, change);
+    tournament.fold(&tournament.set_paused(paused).unwrap().unwrap());
 }
 
 fn called(changes: &[Change]) -> Vec<(usize, Vec<usize>)> {
@@ -36,19 +29,12 @@ fn called(changes: &[Change]) -> Vec<(usize, Vec<usize>)> {
     games.collect()
 }
 
-/// Ends a game; lower numbers win.
-fn play(tournament: &mut Tournament, game: usize) {
-    let ended = played_by_number(tournament, game);
-    end(tournament, game, ended);
-}
-
 /// A Swiss tournament of one round at two tables, with two games at each.
-fn two_tables(change: impl FnOnce(&mut Settings)) -> Tournament {
-    let mut settings = settings(Format::Swiss);
-    settings.rounds = Some(1);
-    settings.games_per_pairing = 2;
-    change(&mut settings);
-    begun(settings, 8)
+fn two_games_each(change: impl FnOnce(&mut Settings)) -> Tournament {
+    two_tables(|settings| {
+        settings.games_per_pairing = 2;
+        change(settings);
+    })
 }
 
 #[test]
@@ -60,15 +46,12 @@ fn before_the_start_a_place_and_its_name_become_free_but_not_its_number() {
     assert_eq!(again, Ok(None), "it has left");
     assert_eq!(tournament.standings().len(), 3);
     assert_eq!(tournament.next_number(), 4);
-    let back = tournament.join(entrant("agent 1")).unwrap();
-    fold(&mut tournament, back);
+    tournament.fold(&tournament.join(entrant("agent 1")).unwrap());
     assert!(tournament.is_withdrawn(1) && !tournament.is_withdrawn(4));
     assert_eq!(tournament.standings().len(), 4);
     withdraw(&mut tournament, 3);
     withdraw(&mut tournament, 0);
-    for change in tournament.begin().unwrap() {
-        fold(&mut tournament, change);
-    }
+    begin(&mut tournament);
     let lines = tournament.standings();
     let mut field: Vec<_> = (lines.iter())
         .map(|line| tournament.participants()[line.participant].name.as_str())
@@ -84,9 +67,7 @@ fn those_who_left_before_the_start_are_not_paired() {
         for who in [0, 4, 8] {
             withdraw(&mut tournament, who);
         }
-        for change in tournament.begin().unwrap() {
-            fold(&mut tournament, change);
-        }
+        begin(&mut tournament);
         let is_out = |who: &usize| [4, 8].contains(who) && format != Format::Knockout;
         play_through(&mut tournament);
         assert_eq!(tournament.state(), State::Finished);
@@ -100,7 +81,7 @@ fn those_who_left_before_the_start_are_not_paired() {
 
 #[test]
 fn who_leaves_forfeits_what_comes_without_being_waited_for() {
-    let mut tournament = two_tables(|_| {});
+    let mut tournament = two_games_each(|_| {});
     follow(&mut tournament, 0);
     let leaver = tournament.games()[0].seats[0];
     withdraw(&mut tournament, leaver);
@@ -110,15 +91,13 @@ fn who_leaves_forfeits_what_comes_without_being_waited_for() {
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
     assert_eq!(called(&follow(&mut tournament, 0)), [(1, vec![leaver])]);
     play(&mut tournament, 1);
-    let standings = tournament.standings();
-    let line = standings.iter().find(|line| line.participant == leaver);
-    let line = line.unwrap();
+    let line = line_of(&tournament, leaver);
     assert_eq!((line.games, line.forfeited, line.score), (2, 1, 5));
 }
 
 #[test]
 fn a_game_that_could_not_start_is_called_again_without_those_who_left() {
-    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    let mut tournament = two_games_each(|settings| settings.max_calls = 1);
     follow(&mut tournament, 0);
     let (leaver, other) = (
         tournament.games()[0].seats[0],
@@ -166,7 +145,7 @@ fn who_left_does_not_advance() {
 
 #[test]
 fn a_paused_tournament_calls_nothing_and_waits_anew_afterwards() {
-    let mut tournament = two_tables(|_| {});
+    let mut tournament = two_games_each(|_| {});
     let away = tournament.games()[0].seats[0];
     tournament.set_present(away, false);
     assert_eq!(called(&follow(&mut tournament, 0)), [(2, vec![])]);
@@ -186,7 +165,7 @@ fn a_paused_tournament_calls_nothing_and_waits_anew_afterwards() {
 
 #[test]
 fn a_postponed_game_goes_to_the_end_of_the_queue_and_costs_no_call() {
-    let mut tournament = two_tables(|settings| settings.max_parallel = 1);
+    let mut tournament = two_games_each(|settings| settings.max_parallel = 1);
     let who = tournament.games()[2].seats[0];
     assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![])]);
     assert_eq!(tournament.postpone(0, None), Err(ByHandProblem::NotDue));
@@ -196,33 +175,24 @@ fn a_postponed_game_goes_to_the_end_of_the_queue_and_costs_no_call() {
         Err(ByHandProblem::NotInGame)
     );
     for _ in 0..2 {
-        let change = tournament.postpone(2, Some(who)).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.postpone(2, Some(who)).unwrap());
     }
     assert_eq!(
         tournament.postpone(2, Some(who)),
         Err(ByHandProblem::PostponedTooOften(2))
     );
-    let mut order = vec![];
-    while tournament.state() == State::Playing {
-        let game = tournament.playing().next().unwrap();
-        order.push(game);
-        end(&mut tournament, game, played(&[1, 2, 3, 4]));
-        follow(&mut tournament, 0);
-    }
-    assert_eq!(order, [0, 1, 3, 2]);
+    assert_eq!(play_in_turn(&mut tournament), [0, 1, 3, 2]);
     assert_eq!(tournament.games()[2].calls, 1);
 }
 
 #[test]
 fn postponing_restarts_the_wait_for_the_absent() {
-    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    let mut tournament = two_games_each(|settings| settings.max_calls = 1);
     let away = tournament.games()[0].seats[0];
     tournament.set_present(away, false);
     follow(&mut tournament, 0);
     for game in [0, 1] {
-        let change = tournament.postpone(game, None).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.postpone(game, None).unwrap());
     }
     assert_eq!(follow(&mut tournament, NO_SHOW_MS - 1), []);
     assert_eq!(follow(&mut tournament, 2 * NO_SHOW_MS - 2), []);
@@ -232,7 +202,7 @@ fn postponing_restarts_the_wait_for_the_absent() {
 
 #[test]
 fn a_void_game_can_be_called_again_before_all_others() {
-    let mut tournament = two_tables(|settings| {
+    let mut tournament = two_games_each(|settings| {
         settings.max_calls = 1;
         settings.max_parallel = 1;
     });
@@ -240,23 +210,13 @@ fn a_void_game_can_be_called_again_before_all_others() {
     end(&mut tournament, 0, Ended::Aborted);
     assert_eq!(tournament.games()[0].state, GameState::Void);
     follow(&mut tournament, 0);
-    let change = tournament.recall(0).unwrap();
-    fold(&mut tournament, change);
-    let change = tournament.recall(3).unwrap();
-    fold(&mut tournament, change);
+    tournament.fold(&tournament.recall(0).unwrap());
+    tournament.fold(&tournament.recall(3).unwrap());
     assert_eq!(
         (tournament.games_over(), tournament.games()[0].calls),
         (0, 0)
     );
-    let mut order = vec![];
-    while tournament.state() == State::Playing {
-        let game = tournament.playing().next().unwrap();
-        order.push(game);
-        let counted = end(&mut tournament, game, played(&[1, 2, 3, 4]));
-        assert!(matches!(counted, Change::Counted { .. }));
-        follow(&mut tournament, 0);
-    }
-    assert_eq!(order, [1, 3, 0, 2]);
+    assert_eq!(play_in_turn(&mut tournament), [1, 3, 0, 2]);
     assert_eq!(tournament.recall(0), Err(ByHandProblem::NotPlaying));
 }
 
@@ -279,13 +239,12 @@ fn a_void_game_of_an_earlier_round_of_a_knockout_stays_void() {
 
 #[test]
 fn whoever_takes_a_place_has_its_results_and_is_waited_for() {
-    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    let mut tournament = two_games_each(|settings| settings.max_calls = 1);
     follow(&mut tournament, 0);
     let place = tournament.games()[0].seats[0];
     withdraw(&mut tournament, place);
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
-    let change = tournament.replace(place, entrant("Bo")).unwrap();
-    fold(&mut tournament, change);
+    tournament.fold(&tournament.replace(place, entrant("Bo")).unwrap());
     assert_eq!(tournament.participants()[place].name, "Bo");
     let [former] = tournament.former(place) else {
         panic!("one former participant");
@@ -304,8 +263,7 @@ fn whoever_takes_a_place_has_its_results_and_is_waited_for() {
         Err(ByHandProblem::Join(JoinProblem::NameTaken))
     );
     for _ in 1..MAX_REPLACEMENTS {
-        let change = tournament.replace(place, entrant("Bo")).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.replace(place, entrant("Bo")).unwrap());
     }
     assert_eq!(
         tournament.replace(place, entrant("Bo")),
@@ -315,7 +273,7 @@ fn whoever_takes_a_place_has_its_results_and_is_waited_for() {
 
 #[test]
 fn games_keep_the_names_of_those_who_were_called_to_them() {
-    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    let mut tournament = two_games_each(|settings| settings.max_calls = 1);
     follow(&mut tournament, 0);
     let place = tournament.games()[0].seats[0];
     let first = tournament.participants()[place].name.clone();
@@ -327,8 +285,7 @@ fn games_keep_the_names_of_those_who_were_called_to_them() {
     };
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
     for by in ["Bo", "Cy"] {
-        let change = tournament.replace(place, entrant(by)).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.replace(place, entrant(by)).unwrap());
         tournament.set_present(place, true);
         follow(&mut tournament, 0);
     }
@@ -359,7 +316,7 @@ fn a_built_in_agent_plays_on_at_once_and_somebody_can_take_the_place_of_a_filler
         tournament.replace(0, by),
         tournament.replace(filler, entrant("Late")),
     ] {
-        fold(&mut tournament, change.unwrap());
+        tournament.fold(&change.unwrap());
     }
     assert_eq!(tournament.games_expected(), 1);
     tournament.set_present(filler, true);
@@ -375,9 +332,7 @@ fn nothing_changes_by_hand_before_the_start_or_after_the_end() {
         tournament.withdraw(4, Leaving::Itself),
         Err(ByHandProblem::NoParticipant)
     );
-    for change in tournament.begin().unwrap() {
-        fold(&mut tournament, change);
-    }
+    begin(&mut tournament);
     assert_eq!(tournament.postpone(99, None), Err(ByHandProblem::NoGame));
     play_through(&mut tournament);
     assert_eq!(
@@ -489,14 +444,11 @@ fn who_has_not_played_stands_behind_who_has() {
     follow(&mut tournament, 3 * NO_SHOW_MS);
     let finalists = tournament.games()[2].seats.clone();
     play(&mut tournament, 2);
-    let ranked: Vec<usize> = (tournament.standings().iter())
-        .map(|line| line.participant)
-        .collect();
     assert!(
         finalists.iter().any(|who| absent.contains(who)),
         "by forfeits"
     );
-    let mut last = ranked[5..].to_vec();
+    let mut last = order(&tournament)[5..].to_vec();
     last.sort_unstable();
     let mut expected = absent;
     expected.sort_unstable();
@@ -507,8 +459,7 @@ fn who_has_not_played_stands_behind_who_has() {
 fn come_and_go(tournament: &mut Tournament, times: u32) {
     for _ in 0..times {
         let who = tournament.next_number();
-        let joined = tournament.join(entrant("fickle")).unwrap();
-        fold(tournament, joined);
+        tournament.fold(&tournament.join(entrant("fickle")).unwrap());
         withdraw(tournament, who);
     }
 }
@@ -522,9 +473,7 @@ fn participants_who_come_and_go_take_nothing_from_the_organiser() {
     for leaving in [Leaving::ByOrganiser, Leaving::Removed] {
         assert!(matches!(tournament.withdraw(0, leaving), Ok(Some(_))));
     }
-    for change in tournament.begin().unwrap() {
-        fold(&mut tournament, change);
-    }
+    begin(&mut tournament);
     pause(&mut tournament, true);
     pause(&mut tournament, false);
     // After the beginning everybody can leave, once.
@@ -533,18 +482,16 @@ fn participants_who_come_and_go_take_nothing_from_the_organiser() {
 
 #[test]
 fn an_organiser_who_has_changed_too_much_can_still_resume_remove_and_close() {
-    let mut tournament = two_tables(|_| {});
+    let mut tournament = two_games_each(|_| {});
     for _ in 0..MAX_CHANGES_BY_HAND - 1 {
-        let change = tournament.postpone(0, None).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.postpone(0, None).unwrap());
     }
     pause(&mut tournament, true);
     let too_many = ByHandProblem::TooMany(MAX_CHANGES_BY_HAND);
     assert_eq!(tournament.postpone(0, None), Err(too_many));
     assert_eq!(tournament.recall(0), Err(too_many));
     assert_eq!(tournament.replace(0, entrant("Bo")), Err(too_many));
-    let removed = tournament.withdraw(0, Leaving::Removed).unwrap().unwrap();
-    fold(&mut tournament, removed);
+    tournament.fold(&tournament.withdraw(0, Leaving::Removed).unwrap().unwrap());
     pause(&mut tournament, false);
     assert_eq!(tournament.set_paused(true), Err(too_many));
     withdraw(&mut tournament, 1);
@@ -553,14 +500,13 @@ fn an_organiser_who_has_changed_too_much_can_still_resume_remove_and_close() {
 
 #[test]
 fn a_participant_postpones_a_bounded_number_of_games() {
-    let mut tournament = two_tables(|settings| settings.games_per_pairing = 100);
+    let mut tournament = two_games_each(|settings| settings.games_per_pairing = 100);
     let who = tournament.games()[0].seats[0];
     let its: Vec<usize> = (0..tournament.games().len())
         .filter(|&game| tournament.games()[game].seats.contains(&who))
         .collect();
     for &game in &its[..MAX_POSTPONEMENTS as usize] {
-        let change = tournament.postpone(game, Some(who)).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.postpone(game, Some(who)).unwrap());
     }
     assert_eq!(
         tournament.postpone(its[0], Some(who)),
@@ -573,11 +519,10 @@ fn a_participant_postpones_a_bounded_number_of_games() {
 
 #[test]
 fn who_left_can_still_be_removed_once() {
-    let mut tournament = two_tables(|_| {});
+    let mut tournament = two_games_each(|_| {});
     withdraw(&mut tournament, 2);
     assert_eq!(tournament.withdraw(2, Leaving::ByOrganiser), Ok(None));
-    let removed = tournament.withdraw(2, Leaving::Removed).unwrap().unwrap();
-    fold(&mut tournament, removed);
+    tournament.fold(&tournament.withdraw(2, Leaving::Removed).unwrap().unwrap());
     assert_eq!(tournament.withdraw(2, Leaving::Removed), Ok(None));
 }
 
@@ -585,7 +530,7 @@ fn who_left_can_still_be_removed_once() {
 fn what_a_former_participant_forfeited_is_not_forfeited_by_the_next() {
     // Replaced while the game that it forfeited is due again, or is being played.
     for is_due in [true, false] {
-        let mut tournament = two_tables(|settings| settings.max_calls = 2);
+        let mut tournament = two_games_each(|settings| settings.max_calls = 2);
         let away = tournament.games()[0].seats[0];
         tournament.set_present(away, false);
         follow(&mut tournament, 0);
@@ -604,14 +549,13 @@ fn what_a_former_participant_forfeited_is_not_forfeited_by_the_next() {
                 missing: vec![],
                 never_started: true,
             };
-            fold(tournament, change);
+            tournament.fold(&change);
             assert_eq!(tournament.games()[played].state, GameState::Due);
         };
         if is_due {
             recall(&mut tournament);
         }
-        let by = tournament.replace(away, entrant("Bo")).unwrap();
-        fold(&mut tournament, by);
+        tournament.fold(&tournament.replace(away, entrant("Bo")).unwrap());
         tournament.set_present(away, true);
         if !is_due {
             // As long as it is being played, the filler has the seat.
@@ -634,13 +578,12 @@ fn what_a_former_participant_forfeited_is_not_forfeited_by_the_next() {
 
 #[test]
 fn a_game_that_never_started_keeps_its_deal_when_somebody_was_replaced() {
-    let mut tournament = two_tables(|settings| settings.deals = Deals::SameAtAllTables);
+    let mut tournament = two_games_each(|settings| settings.deals = Deals::SameAtAllTables);
     follow(&mut tournament, 0);
     let deal = tournament.games()[0].deal;
     assert!(deal.is_some() && deal == tournament.games()[2].deal);
     let place = tournament.games()[0].seats[0];
-    let by = tournament.replace(place, entrant("Bo")).unwrap();
-    fold(&mut tournament, by);
+    tournament.fold(&tournament.replace(place, entrant("Bo")).unwrap());
     let missing = vec![place];
     end(&mut tournament, 0, Ended::NeverStarted { missing });
     assert_eq!(tournament.games()[0].deal, deal, "nobody has seen it");
@@ -663,8 +606,7 @@ fn while_it_is_paused_the_last_void_game_can_be_called() {
         pause(&mut tournament, true);
         end(&mut tournament, 0, Ended::Aborted);
         assert_eq!(follow(&mut tournament, 0), [], "it neither ends nor draws");
-        let change = tournament.recall(0).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.recall(0).unwrap());
         pause(&mut tournament, false);
         assert_eq!(called(&follow(&mut tournament, 0)), [(0, vec![])]);
         play_through(&mut tournament);
@@ -676,12 +618,11 @@ fn while_it_is_paused_the_last_void_game_can_be_called() {
 
 #[test]
 fn a_game_of_which_all_have_left_cannot_be_called() {
-    let mut tournament = two_tables(|settings| settings.max_parallel = 1);
+    let mut tournament = two_games_each(|settings| settings.max_parallel = 1);
     let seats = tournament.games()[2].seats.clone();
     seats.iter().for_each(|&who| withdraw(&mut tournament, who));
     assert_eq!(tournament.recall(2), Err(ByHandProblem::NobodyLeft));
-    let by = tournament.replace(seats[0], entrant("Bo")).unwrap();
-    fold(&mut tournament, by);
+    tournament.fold(&tournament.replace(seats[0], entrant("Bo")).unwrap());
     assert!(tournament.recall(2).is_ok());
 }
 
@@ -689,7 +630,7 @@ fn a_game_of_which_all_have_left_cannot_be_called() {
 fn a_void_game_whose_deal_was_seen_gets_a_new_one() {
     // Aborted at its last call, or nobody came: the other table still has the deal to play.
     for is_kept in [false, true] {
-        let mut tournament = two_tables(|settings| {
+        let mut tournament = two_games_each(|settings| {
             settings.deals = Deals::SameAtAllTables;
             settings.max_calls = 1;
         });
@@ -708,8 +649,7 @@ fn a_void_game_whose_deal_was_seen_gets_a_new_one() {
             end(&mut tournament, 0, Ended::Aborted);
         }
         assert_eq!(tournament.games()[0].state, GameState::Void);
-        let change = tournament.recall(0).unwrap();
-        fold(&mut tournament, change);
+        tournament.fold(&tournament.recall(0).unwrap());
         let expected = deal.filter(|_| is_kept);
         assert_eq!(tournament.games()[0].deal, expected);
         // The count of what is left to play of the deal holds.
@@ -740,9 +680,7 @@ fn a_table_that_its_participant_gives_up_goes_to_the_next_game() {
             tournament.fold(&change.unwrap());
             tournament.set_present(number, true);
         }
-        for change in tournament.begin().unwrap() {
-            tournament.fold(&change);
-        }
+        begin(&mut tournament);
         follow(&mut tournament, 0);
         let at_tables = tournament.games().iter().filter(|game| game.physical);
         (at_tables.count() == 2).then_some(tournament)
@@ -753,8 +691,8 @@ fn a_table_that_its_participant_gives_up_goes_to_the_next_game() {
     };
     let seats = &tournament.games()[game].seats;
     let at_table = *seats.iter().find(|who| **who < 2).unwrap();
-    let withdrawn = tournament.withdraw(at_table, Leaving::Removed).unwrap();
-    tournament.fold(&withdrawn.unwrap());
+    let withdrawn = tournament.withdraw(at_table, Leaving::Removed);
+    tournament.fold(&withdrawn.unwrap().unwrap());
     assert_eq!(follow(&mut tournament, 0), [], "the table is still in use");
     end(&mut tournament, game, Ended::Aborted);
     follow(&mut tournament, 0);

@@ -1,10 +1,10 @@
 //! Calls of games: order, waiting for absent participants, forfeits, voided games.
 
-use chefshat_tournament::{Change, Ended, Format, Game, GameState, Settings, State, Tournament};
+use chefshat_tournament::{Change, Ended, Format, Game, GameResult, GameState, State, Tournament};
 
-use super::support::{begun, end, follow, played, settings};
-
-const NO_SHOW_MS: u64 = 1000;
+use super::support::{
+    NO_SHOW_MS, begun, end, follow, line_of, play_in_turn, played, settings, two_tables,
+};
 
 fn called(game: usize) -> Change {
     Change::Called {
@@ -36,20 +36,17 @@ fn not_started(game: usize, missing: &[usize]) -> Change {
     }
 }
 
-/// A Swiss tournament of one round at two tables.
-fn two_tables(change: impl FnOnce(&mut Settings)) -> Tournament {
-    let mut settings = settings(Format::Swiss);
-    settings.rounds = Some(1);
-    change(&mut settings);
-    begun(settings, 8)
-}
-
 fn state(tournament: &Tournament, game: usize) -> &GameState {
     &tournament.games()[game].state
 }
 
 fn seat(tournament: &Tournament, game: usize, seat: usize) -> usize {
     tournament.games()[game].seats[seat]
+}
+
+fn places(result: &GameResult) -> Vec<usize> {
+    let seats = result.seats.iter();
+    seats.map(|seat| seat.statistics.place).collect()
 }
 
 #[test]
@@ -60,14 +57,7 @@ fn games_are_called_in_order_up_to_the_maximum() {
     });
     assert_eq!(follow(&mut tournament, 0), [called(0)]);
     assert_eq!(tournament.wake_at(), None);
-    let mut order = vec![];
-    while tournament.state() == State::Playing {
-        let game = tournament.playing().next().unwrap();
-        order.push(game);
-        end(&mut tournament, game, played(&[1, 2, 3, 4]));
-        follow(&mut tournament, 0);
-    }
-    assert_eq!(order, [0, 1, 2, 3]);
+    assert_eq!(play_in_turn(&mut tournament), [0, 1, 2, 3]);
     assert_eq!(tournament.state(), State::Finished);
 }
 
@@ -105,13 +95,11 @@ fn absent_participants_are_waited_for_then_called_again_then_forfeit() {
     // The filler in the forfeited seat wins; the others move up.
     end(&mut tournament, 0, played(&[2, 3, 1, 4]));
     let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result
-        .seats
-        .iter()
-        .map(|seat| seat.statistics.place)
-        .collect();
     let scores: Vec<u32> = result.seats.iter().map(|seat| seat.score).collect();
-    assert_eq!((places, scores), (vec![1, 2, 4, 3], vec![5, 3, 0, 1]));
+    assert_eq!(
+        (places(result), scores),
+        (vec![1, 2, 4, 3], vec![5, 3, 0, 1])
+    );
     let forfeit = result.seats[2];
     assert!(forfeit.forfeited);
     assert_eq!(
@@ -119,9 +107,7 @@ fn absent_participants_are_waited_for_then_called_again_then_forfeit() {
         (0, 0),
         "the filler's play is not the participant's"
     );
-    let standings = tournament.standings();
-    let line = standings.iter().find(|line| line.participant == away);
-    let line = line.unwrap();
+    let line = line_of(&tournament, away);
     assert_eq!((line.games, line.forfeited, line.score), (1, 1, 0));
     assert_eq!(line.places, [0, 0, 0, 1]);
 }
@@ -163,14 +149,8 @@ fn a_rescheduled_game_comes_after_the_others() {
     let mut tournament = begun(settings, 4);
     follow(&mut tournament, 0);
     assert_eq!(end(&mut tournament, 0, Ended::Aborted), rescheduled(0, &[]));
-    let mut order = vec![];
-    for _ in 0..3 {
-        follow(&mut tournament, 0);
-        let game = tournament.playing().next().unwrap();
-        order.push(game);
-        end(&mut tournament, game, played(&[1, 2, 3, 4]));
-    }
-    assert_eq!(order, [1, 2, 0]);
+    follow(&mut tournament, 0);
+    assert_eq!(play_in_turn(&mut tournament), [1, 2, 0]);
 }
 
 #[test]
@@ -204,14 +184,8 @@ fn missing_the_last_call_forfeits_even_when_connected() {
     });
     assert_eq!(follow(&mut tournament, 0), [forfeited(0, &both)]);
     end(&mut tournament, 0, played(&[4, 1, 2, 3]));
-    let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result
-        .seats
-        .iter()
-        .map(|seat| seat.statistics.place)
-        .collect();
     assert_eq!(
-        places,
+        places(tournament.games()[0].result().unwrap()),
         [2, 3, 1, 4],
         "those who forfeited, in the order of their seats"
     );

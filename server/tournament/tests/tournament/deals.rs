@@ -93,8 +93,7 @@ fn a_deal_opens_when_its_last_game_is_over() {
     assert_eq!(open(&tournament), [true, false]);
     assert!(!tournament.is_deal_open(99), "not yet drawn");
     follow(&mut tournament, 0);
-    let close = tournament.close().unwrap();
-    tournament.fold(&close);
+    tournament.fold(&tournament.close().unwrap());
     assert_eq!(
         open(&tournament),
         [true, true],

@@ -5,7 +5,7 @@ use chefshat_tournament::{
     BeginProblem, Change, Deals, Entrant, Format, JoinProblem, Settings, State, Tournament,
 };
 
-use super::support::{begun, end, entrant, follow, joined, played, settings};
+use super::support::{begin, begun, end, entrant, follow, joined, played, settings};
 
 #[test]
 fn settings_are_refused_by_the_name_of_their_field() {
@@ -119,9 +119,7 @@ fn joining_is_refused_with_a_reason() {
     tournament.fold(&built_in.unwrap());
     assert!(tournament.is_present(2), "a built-in agent always is");
     assert_eq!(join(&tournament, |_| {}), Err(JoinProblem::Full));
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
+    begin(&mut tournament);
     assert_eq!(join(&tournament, |_| {}), Err(JoinProblem::Started));
     assert_eq!(tournament.participants().len(), 4, "a filler was added");
 }
@@ -132,8 +130,7 @@ fn it_starts_once_and_with_enough_participants() {
     for format in Format::ALL {
         let mut tournament = joined(settings(format), 1);
         assert_eq!(tournament.begin(), Err(too_few));
-        let change = tournament.join(entrant("Eve")).unwrap();
-        tournament.fold(&change);
+        tournament.fold(&tournament.join(entrant("Eve")).unwrap());
         assert_eq!(tournament.state(), State::Open);
         let changes = tournament.begin().unwrap();
         assert!(matches!(
@@ -156,9 +153,7 @@ fn a_filler_takes_a_name_that_is_free() {
     for name in ["Filler 1", "filler"] {
         tournament.fold(&Change::Joined(entrant(name)));
     }
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
+    begin(&mut tournament);
     assert_eq!(tournament.participants()[3].name, "Filler 2");
 }
 
@@ -169,8 +164,7 @@ fn it_starts_automatically_at_the_set_number() {
         settings.start_when_joined = Some(6);
         let mut by_itself = joined(settings, 5);
         assert_eq!(follow(&mut by_itself, 0), []);
-        let change = by_itself.join(entrant("Eve")).unwrap();
-        by_itself.fold(&change);
+        by_itself.fold(&by_itself.join(entrant("Eve")).unwrap());
         by_itself.set_present(5, true);
         let by_owner = by_itself.clone();
         let begun = by_owner.begin().unwrap();
@@ -216,7 +210,6 @@ fn closing_voids_unfinished_games() {
     assert_eq!(tournament.begin(), Err(BeginProblem::Started));
 
     let mut open = joined(settings(Format::Swiss), 3);
-    let close = open.close().unwrap();
-    open.fold(&close);
+    open.fold(&open.close().unwrap());
     assert_eq!(open.state(), State::Closed);
 }

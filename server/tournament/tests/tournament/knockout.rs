@@ -1,23 +1,15 @@
 //! Structure of a knockout: tables of four, two of each advance, halves meet in the final, fillers
 //! are spread evenly.
 
-use chefshat_tournament::{Change, Format, State, Tournament};
+use chefshat_tournament::{Change, Format, State};
 
-use super::support::{begun, drawn, end, follow, play_through, played, settings};
-
-fn standing_order(tournament: &Tournament) -> Vec<usize> {
-    let standings = tournament.standings();
-    standings.iter().map(|line| line.participant).collect()
-}
+use super::support::{begun, drawn, end, follow, order, play_through, played, settings, won_by};
 
 #[test]
 fn sixteen_become_eight_become_four() {
     let mut tournament = begun(settings(Format::Knockout), 16);
-    let first: Vec<Vec<usize>> = tournament
-        .games()
-        .iter()
-        .map(|game| game.seats.clone())
-        .collect();
+    let games = tournament.games().iter();
+    let first: Vec<Vec<usize>> = games.map(|game| game.seats.clone()).collect();
     assert_eq!((first.len(), tournament.rounds()), (4, 3));
     let mut everybody = first.concat();
     everybody.sort_unstable();
@@ -48,10 +40,7 @@ fn sixteen_become_eight_become_four() {
         last_rounds,
         [3, 3, 3, 3, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1]
     );
-    assert_eq!(
-        standing_order(&tournament)[..4],
-        sorted(&rounds[1].tables[0])
-    );
+    assert_eq!(order(&tournament)[..4], sorted(&rounds[1].tables[0]));
     let places: Vec<u32> = standings.iter().map(|line| line.place).collect();
     assert_eq!(places, (1..=16).collect::<Vec<_>>());
 }
@@ -70,21 +59,13 @@ fn the_winner_of_the_final_is_first_whatever_its_score() {
     let seats = tournament.games()[2].seats.clone();
     // The second of the first table wins.
     let winner = tournament.games()[0].seats[1];
-    let places: Vec<usize> = seats
-        .iter()
-        .map(|&who| match (who == winner, who < winner) {
-            (true, _) => 1,
-            (false, true) => 2 + seats.iter().filter(|&&other| other < who).count(),
-            (false, false) => 1 + seats.iter().filter(|&&other| other < who).count(),
-        })
-        .collect();
-    end(&mut tournament, 2, played(&places));
+    end(&mut tournament, 2, won_by(winner, &seats));
     follow(&mut tournament, 0);
     assert_eq!(tournament.state(), State::Finished);
-    let order = standing_order(&tournament);
-    assert_eq!(order[0], winner);
-    assert_eq!(sorted(&order[..4]), sorted(&seats));
-    assert_eq!(sorted(&order[4..]), sorted(&others));
+    let ranked = order(&tournament);
+    assert_eq!(ranked[0], winner);
+    assert_eq!(sorted(&ranked[..4]), sorted(&seats));
+    assert_eq!(sorted(&ranked[4..]), sorted(&others));
 }
 
 #[test]
@@ -171,11 +152,10 @@ fn tables_of_an_unfinished_round_decide_nothing() {
     follow(&mut tournament, 0);
     let seats = tournament.games()[0].seats.clone();
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
-    let order = standing_order(&tournament);
-    assert_eq!(order[..2], seats[..2], "5 and 3, all others 1 or 0");
-    let close = tournament.close().unwrap();
-    tournament.fold(&close);
-    assert_eq!(standing_order(&tournament), order);
+    let ranked = order(&tournament);
+    assert_eq!(ranked[..2], seats[..2], "5 and 3, all others 1 or 0");
+    tournament.fold(&tournament.close().unwrap());
+    assert_eq!(order(&tournament), ranked);
 }
 
 fn lowest(table: &[usize], count: usize) -> Vec<usize> {

@@ -2,7 +2,7 @@
 
 use chefshat_tournament::Format;
 
-use super::support::{Round, begun, drawn, joined, meetings, play_through, range, settings};
+use super::support::{Round, begun, drawn, joined, meetings, order, play_through, range, settings};
 
 /// The rounds of a round robin with this number of participants.
 fn rounds(participants: usize, players: usize, rounds: Option<u32>) -> Vec<Round> {
@@ -115,11 +115,8 @@ fn a_large_field_meets_nearly_equally_often() {
 #[test]
 fn fewer_than_a_table_are_filled_up() {
     let tournament = begun(settings(Format::RoundRobin), 3);
-    let names: Vec<&str> = tournament
-        .participants()
-        .iter()
-        .map(|entrant| entrant.name.as_str())
-        .collect();
+    let participants = tournament.participants().iter();
+    let names: Vec<&str> = participants.map(|entrant| &*entrant.name).collect();
     assert_eq!(names, ["agent 0", "agent 1", "agent 2", "Filler 1"]);
     assert!(tournament.participants()[3].filler);
     assert_eq!((tournament.rounds(), tournament.games().len()), (3, 3));
@@ -133,8 +130,11 @@ fn rounds_do_not_wait_for_each_other() {
     assert_eq!(tournament.round(), 1);
     play_through(&mut tournament);
     assert_eq!(tournament.round(), 7);
+    assert_eq!(
+        order(&tournament),
+        [0, 1, 2, 3, 4, 5, 6, 7],
+        "the lower number wins"
+    );
     let standings = tournament.standings();
-    let order: Vec<usize> = standings.iter().map(|line| line.participant).collect();
-    assert_eq!(order, [0, 1, 2, 3, 4, 5, 6, 7], "the lower number wins");
     assert!(standings.iter().all(|line| line.games == 7));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use chefshat_tournament::{Ended, Format, SeatStatistics, Tournament};
 
-use super::support::{begun, end, follow, played, settings};
+use super::support::{begun, end, follow, line_of, order, played, settings, won_by};
 
 /// Places by participant and points by participant, for each game of one table of four.
 type Script = [([usize; 4], [u64; 4])];
@@ -33,11 +33,6 @@ fn drawn_by(seed: u8, games: &Script) -> Tournament {
     }
     follow(&mut tournament, 0);
     tournament
-}
-
-fn order(tournament: &Tournament) -> Vec<usize> {
-    let standings = tournament.standings();
-    standings.iter().map(|line| line.participant).collect()
 }
 
 #[test]
@@ -106,10 +101,7 @@ fn a_standing_adds_up_the_games() {
     let games: u32 = standings.iter().map(|line| line.games).sum();
     let byes: u32 = standings.iter().map(|line| line.byes).sum();
     assert_eq!((games, byes), (8, 2));
-    let line = standings
-        .iter()
-        .find(|line| Some(line.participant) == first)
-        .unwrap();
+    let line = line_of(&tournament, first.unwrap());
     let played = u64::from(line.games);
     assert!(line.substituted >= 1);
     assert_eq!((line.wrong_actions, line.timeouts), (2 * played, played));
@@ -141,22 +133,8 @@ fn playing_fewer_games_is_no_disadvantage() {
         seats.contains(&fresh),
         "the bye of the first round plays now"
     );
-    let places: Vec<usize> = seats
-        .iter()
-        .map(|&who| match who {
-            _ if who == fresh => 1,
-            _ => {
-                2 + seats
-                    .iter()
-                    .filter(|&&other| other < who && other != fresh)
-                    .count()
-            }
-        })
-        .collect();
-    end(&mut tournament, 1, played(&places));
-    let standings = tournament.standings();
-    let line = standings.iter().find(|line| line.participant == fresh);
-    let line = line.unwrap();
+    end(&mut tournament, 1, won_by(fresh, &seats));
+    let line = line_of(&tournament, fresh);
     assert_eq!((line.games, line.score), (1, 5));
     assert!(line.place <= 2);
 }
@@ -166,9 +144,9 @@ fn the_seed_breaks_remaining_ties() {
     // The second game reverses the places of the first.
     let games = [([1, 2, 3, 4], [4; 4]), ([4, 3, 2, 1], [4; 4])];
     let ahead = |seed: u8| {
-        let order = order(&drawn_by(seed, &games));
-        assert_eq!(order, self::order(&drawn_by(seed, &games)));
-        order[0]
+        let ranked = order(&drawn_by(seed, &games));
+        assert_eq!(ranked, order(&drawn_by(seed, &games)));
+        ranked[0]
     };
     let ahead: BTreeSet<usize> = (0..16).map(ahead).collect();
     assert_eq!(ahead, BTreeSet::from([0, 3]));

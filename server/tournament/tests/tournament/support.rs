@@ -2,8 +2,10 @@
 
 use std::iter::repeat_n;
 
-pub(crate) use chefshat_tournament::testing::{entrant, settings};
-use chefshat_tournament::{Change, Ended, SeatStatistics, Settings, State, Tournament, testing};
+pub(crate) use chefshat_tournament::testing::{NO_SHOW_MS, begin, entrant, settings};
+use chefshat_tournament::{
+    Change, Ended, Format, SeatStatistics, Settings, Standing, State, Tournament, testing,
+};
 
 /// A tournament with this number of participants, all present.
 pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
@@ -13,6 +15,14 @@ pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
 /// The same, begun.
 pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
     testing::begun(settings, repeat_n(None, participants))
+}
+
+/// A Swiss tournament of one round at two tables.
+pub(crate) fn two_tables(change: impl FnOnce(&mut Settings)) -> Tournament {
+    let mut settings = settings(Format::Swiss);
+    settings.rounds = Some(1);
+    change(&mut settings);
+    begun(settings, 8)
 }
 
 /// A result with these places by seat, and 10 points minus the place.
@@ -29,12 +39,18 @@ pub(crate) fn played(places: &[usize]) -> Ended {
     }
 }
 
+/// A result in which this participant wins, and lower numbers are ahead of higher.
+pub(crate) fn won_by(winner: usize, seats: &[usize]) -> Ended {
+    let key = |who: usize| (who != winner, who);
+    let better = |who: usize| seats.iter().filter(|&&other| key(other) < key(who)).count();
+    let places: Vec<usize> = seats.iter().map(|&who| better(who) + 1).collect();
+    played(&places)
+}
+
 /// A result in which lower participant numbers win.
 pub(crate) fn played_by_number(tournament: &Tournament, game: usize) -> Ended {
     let seats = &tournament.games()[game].seats;
-    let better = |who: usize| seats.iter().filter(|&&other| other < who).count();
-    let places: Vec<usize> = seats.iter().map(|&who| better(who) + 1).collect();
-    played(&places)
+    won_by(*seats.iter().min().unwrap(), seats)
 }
 
 /// Folds all changes that follow at this time.
@@ -54,6 +70,25 @@ pub(crate) fn end(tournament: &mut Tournament, game: usize, ended: Ended) -> Cha
     change
 }
 
+/// Ends a game; lower numbers win.
+pub(crate) fn play(tournament: &mut Tournament, game: usize) -> Change {
+    let ended = played_by_number(tournament, game);
+    end(tournament, game, ended)
+}
+
+/// Plays to the end, one game at a time, each won by its first seat. Returns the order of the games.
+pub(crate) fn play_in_turn(tournament: &mut Tournament) -> Vec<usize> {
+    let mut order = vec![];
+    while tournament.state() == State::Playing {
+        let game = tournament.playing().next().unwrap();
+        order.push(game);
+        let counted = end(tournament, game, played(&[1, 2, 3, 4]));
+        assert!(matches!(counted, Change::Counted { .. }));
+        follow(tournament, 0);
+    }
+    order
+}
+
 /// Plays to the end with all participants present; lower numbers win. Returns the changes.
 pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
     let mut changes = Vec::new();
@@ -65,11 +100,22 @@ pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
             "the tournament is stuck"
         );
         for game in playing {
-            let ended = played_by_number(tournament, game);
-            changes.push(end(tournament, game, ended));
+            changes.push(play(tournament, game));
         }
     }
     changes
+}
+
+/// The participants in the order of the standings.
+pub(crate) fn order(tournament: &Tournament) -> Vec<usize> {
+    let standings = tournament.standings();
+    standings.iter().map(|line| line.participant).collect()
+}
+
+/// The line of a participant in the standings.
+pub(crate) fn line_of(tournament: &Tournament, who: usize) -> Standing {
+    let mut standings = tournament.standings().into_iter();
+    standings.find(|line| line.participant == who).unwrap()
 }
 
 /// The pairings of a round.

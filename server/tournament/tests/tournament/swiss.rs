@@ -3,12 +3,10 @@
 
 use chefshat_tournament::{Format, Leaving, Tournament};
 
-use super::support::{
-    Round, begun, drawn, end, follow, meetings, played_by_number, range, settings,
-};
+use super::support::{Round, begun, drawn, follow, meetings, order, play, range, settings};
 
 /// Plays all rounds with lower numbers winning, and calls back with the standings before each.
-fn play(
+fn play_all(
     mut tournament: Tournament,
     mut look: impl FnMut(&Tournament, &Round),
 ) -> (Tournament, Vec<Round>) {
@@ -26,8 +24,7 @@ fn play(
             break;
         }
         for game in playing {
-            let ended = played_by_number(&tournament, game);
-            end(&mut tournament, game, ended);
+            play(&mut tournament, game);
         }
     }
     let players = tournament.settings().players;
@@ -70,7 +67,7 @@ fn few_meet_twice() {
     ] {
         let mut settings = settings(Format::Swiss);
         settings.rounds = rounds;
-        let (_, drawn) = play(begun(settings, participants), |_, _| {});
+        let (_, drawn) = play_all(begun(settings, participants), |_, _| {});
         let met = meetings(drawn.iter().flat_map(|round| &round.tables), participants);
         let twice = met.iter().filter(|&&times| times > 1).count();
         assert_eq!(
@@ -85,7 +82,7 @@ fn few_meet_twice() {
 #[test]
 fn similar_standings_meet() {
     let mut apart = Vec::new();
-    let (tournament, _) = play(begun(settings(Format::Swiss), 40), |before, round| {
+    let (tournament, _) = play_all(begun(settings(Format::Swiss), 40), |before, round| {
         let mut rank = vec![0; 40];
         for line in before.standings() {
             rank[line.participant] = line.place as usize;
@@ -103,12 +100,7 @@ fn similar_standings_meet() {
     for (apart, most) in apart.iter().zip([1.7, 3.0, 6.0, 9.0, 12.0]) {
         assert!(*apart < most, "{apart}");
     }
-    let best: Vec<usize> = tournament
-        .standings()
-        .iter()
-        .take(3)
-        .map(|line| line.participant)
-        .collect();
+    let best = &order(&tournament)[..3];
     assert!(best.iter().all(|&who| who < 12), "{best:?}");
 }
 
@@ -117,7 +109,7 @@ fn byes_go_to_the_lowest_who_had_fewest() {
     for (participants, rounds) in [(5, 4), (6, 5), (7, 6), (11, 5), (42, 6)] {
         let mut settings = settings(Format::Swiss);
         settings.rounds = Some(rounds);
-        let (tournament, _) = play(begun(settings, participants), |before, round| {
+        let (tournament, _) = play_all(begun(settings, participants), |before, round| {
             let standings = before.standings();
             let fewest =
                 |line: &chefshat_tournament::Standing| (line.byes, std::cmp::Reverse(line.place));
@@ -130,14 +122,8 @@ fn byes_go_to_the_lowest_who_had_fewest() {
             expected.sort_unstable();
             assert_eq!(round.byes, expected);
         });
-        let byes = range(
-            tournament
-                .standings()
-                .iter()
-                .map(|line| line.byes)
-                .collect::<Vec<_>>()
-                .into_iter(),
-        );
+        let standings = tournament.standings();
+        let byes = range(standings.iter().map(|line| line.byes));
         assert!(byes.1 - byes.0 <= 1, "{byes:?}");
     }
 }
@@ -146,7 +132,7 @@ fn byes_go_to_the_lowest_who_had_fewest() {
 fn everybody_has_each_seat_about_equally_often() {
     let mut settings = settings(Format::Swiss);
     settings.rounds = Some(8);
-    let (_, rounds) = play(begun(settings, 24), |_, _| {});
+    let (_, rounds) = play_all(begun(settings, 24), |_, _| {});
     let mut had = vec![[0; 4]; 24];
     for table in rounds.iter().flat_map(|round| &round.tables) {
         for (seat, &who) in table.iter().enumerate() {
@@ -182,8 +168,7 @@ fn those_who_have_left_make_room() {
         let mut tournament = begun(settings, participants);
         follow(&mut tournament, 0);
         for game in tournament.playing().collect::<Vec<_>>() {
-            let ended = played_by_number(&tournament, game);
-            end(&mut tournament, game, ended);
+            play(&mut tournament, game);
         }
         for who in leaving {
             let left = tournament.withdraw(*who, Leaving::Itself);

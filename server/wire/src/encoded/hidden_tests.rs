@@ -16,8 +16,10 @@ use chefshat_referee::counts::JOKER;
 use chefshat_referee::{Report, SeenCards};
 use chefshat_room::journal::{Change, Fill, GameHeader, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
-use chefshat_room::testing::real_table::{PERSON, policy, shifts};
-use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, study_game, study_member};
+use chefshat_room::testing::real_table::{PERSON, policy};
+use chefshat_room::testing::{
+    OPEN, Table, dealt, ms, second_shift, shifts, study_game, study_member,
+};
 use chefshat_room::{Core, OpenDecision, ReportVerdict, Verdict};
 use prost::Message as _;
 

@@ -6,7 +6,7 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::import::import;
 use chefshat_record::replay::walk;
 
-use chefshat_record::testing::{HiddenGolden, Observed, TestGame, transcript};
+use chefshat_record::testing::{HiddenGolden, Observed, TestGame, events, transcript};
 
 use super::spec;
 
@@ -27,7 +27,7 @@ pub(super) fn knowledge(record: &[v1::RecordLine]) -> Vec<(u32, bool, bool)> {
 #[test]
 fn stated_hands_and_those_that_follow_are_known() {
     let rules = spec(4, 11, 2).validate().unwrap();
-    let played = TestGame::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
+    let played = TestGame::dealt(rules, 5, 9).played();
     // All turns of the default game determine all hands.
     let complete = import(transcript(&rules, &played, Observed::TURNS).as_bytes()).unwrap();
     let known = knowledge(&complete);
@@ -45,17 +45,11 @@ fn stated_hands_and_those_that_follow_are_known() {
     for (seat, hand, mask) in known {
         assert_eq!((hand, mask), (seat == 2, seat == 2));
     }
-    let hands: Vec<usize> = broken_off
-        .iter()
-        .filter_map(|line| match &line.line {
-            Some(Line::Event(event)) => match &event.kind {
-                Some(Kind::ShiftStarted(started)) => Some(started.hands.len()),
-                _ => None,
-            },
-            _ => None,
-        })
-        .collect();
-    assert_eq!(hands, [1]);
+    let hands = events(&broken_off).filter_map(|(_, kind)| match kind {
+        Kind::ShiftStarted(started) => Some(started.hands.len()),
+        _ => None,
+    });
+    assert_eq!(hands.collect::<Vec<_>>(), [1]);
 }
 
 /// The hands before each turn, which of them are known, and which including the Golden card.
@@ -97,7 +91,7 @@ fn known_hands_are_right() {
     let (mut with_golden, mut without_golden) = (0, 0);
     for (number, spec) in (0u8..).zip(specs) {
         let rules = spec.validate().unwrap();
-        let played = TestGame::dealt(rules, 40 + number, 3).record(|_| v1::DecisionSource::Agent);
+        let played = TestGame::dealt(rules, 40 + number, 3).played();
         let expected = before_turns(&played);
         // Other hands and gifts are observed each time, and other numbers of turns.
         for (hands, gifts) in [

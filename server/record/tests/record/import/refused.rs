@@ -4,6 +4,7 @@
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::import::import;
 use chefshat_record::replay::replay;
+use chefshat_record::testing::header;
 
 use super::{NOTED, SPARSE, documented, from_the_second_shift};
 
@@ -158,11 +159,7 @@ fn damaged_imported_records_are_reported() {
             "every player of a real table decides",
         ),
         (
-            |lines| {
-                if let Some(Line::Header(header)) = &mut lines[0].line {
-                    header.seed_commitment = vec![0; 32];
-                }
-            },
+            |lines| header(lines).seed_commitment = vec![0; 32],
             1,
             "seedCommitment has 32 bytes",
         ),

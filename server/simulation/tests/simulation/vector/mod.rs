@@ -25,31 +25,21 @@ fn against(agents: [AgentKind; 3], games: u32) -> VectorSetup {
     VectorSetup::new(rules(), games, &agents, Seeds::Base(7)).unwrap()
 }
 
+fn values<const N: usize, T>(column: &[u8], value: fn([u8; N]) -> T) -> Vec<T> {
+    let (chunks, _) = column.as_chunks();
+    chunks.iter().map(|bytes| value(*bytes)).collect()
+}
+
 fn u32s(column: &[u8]) -> Vec<u32> {
-    column
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|bytes| u32::from_le_bytes(*bytes))
-        .collect()
+    values(column, u32::from_le_bytes)
 }
 
 fn u64s(column: &[u8]) -> Vec<u64> {
-    column
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|bytes| u64::from_le_bytes(*bytes))
-        .collect()
+    values(column, u64::from_le_bytes)
 }
 
 fn f32s(column: &[u8]) -> Vec<f32> {
-    column
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|bytes| f32::from_le_bytes(*bytes))
-        .collect()
+    values(column, f32::from_le_bytes)
 }
 
 fn masks(batch: &Batch) -> Vec<Mask> {

@@ -6,7 +6,7 @@ use super::fencing::Pair;
 use super::*;
 use crate::form::FORM;
 use crate::studies::StudyHeader;
-use chefshat_room::ids::{Id, UnitId};
+use chefshat_room::ids::UnitId;
 
 const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
@@ -15,16 +15,13 @@ const LOOKS: u32 = 10_000;
 
 async fn create(store: &PostgresStore, rooms: impl IntoIterator<Item = u8>) {
     for room in rooms {
-        let created = store.create(durable(room), vec![entry(1)]);
-        created.await.expect("created");
+        created(store, room).await;
     }
 }
 
 fn at(epoch: Epoch, rooms: impl IntoIterator<Item = u8>) -> Vec<(UnitId, Epoch)> {
     let rooms = rooms.into_iter();
-    rooms
-        .map(|room| (Id::from_bytes([room; 16]), epoch))
-        .collect()
+    rooms.map(|room| (id(room), epoch)).collect()
 }
 
 #[tokio::test]
@@ -33,7 +30,7 @@ async fn several_orphans_are_claimed_together() {
     create(&pair.first, 1..=4).await;
     create(&pair.second, [5]).await;
     pair.stall().await;
-    let claimed = pair.second.claim(Id::from_bytes([2; 16]), FIRST).await;
+    let claimed = pair.second.claim(id(2), FIRST).await;
     assert_eq!(claimed, Ok(Some(SECOND)));
     let orphans = at(FIRST, 1..=6);
     let claimed = pair.second.claim_all(orphans).await.expect("it answers");
@@ -98,24 +95,19 @@ async fn a_released_unit_is_offered_to_another_node() {
             .beat(Heartbeat { reached, ..REACHED })
             .await
             .expect("it answers");
-        let released = pair.first.release(Id::from_bytes([room; 16]), FIRST, None);
+        let released = pair.first.release(id(room), FIRST, None);
         released.await.expect("released");
     }
-    assert_eq!(
-        pair.second.handed_over().await,
-        (Id::from_bytes([2; 16]), FIRST)
-    );
+    assert_eq!(pair.second.handed_over().await, (id(2), FIRST));
 
     // A node that is named has it, whichever other ones there are.
     let other = node(&pair.database).await;
     other.join(info).await.expect("it joins");
     other.beat(REACHED).await.expect("it answers");
     for room in 3..=8 {
-        let released = pair
-            .first
-            .release(Id::from_bytes([room; 16]), FIRST, Some(next));
+        let released = pair.first.release(id(room), FIRST, Some(next));
         released.await.expect("released");
-        let unit = (Id::from_bytes([room; 16]), FIRST);
+        let unit = (id(room), FIRST);
         assert_eq!(pair.second.handed_over().await, unit);
     }
     other.close().await;
@@ -194,10 +186,9 @@ async fn what_is_claimed_has_the_form_of_its_new_owner() {
     create(&pair.first, [1]).await;
     let first = &pair.first;
     for number in [2, 3] {
-        let created = first.create_tournament(cup(number), begun());
-        created.await.expect("created");
+        create_cup(first, number).await;
         let study = StudyHeader {
-            id: Id::from_bytes([number + 2; 16]),
+            id: id(number + 2),
             settings: v1::StudySettings::default(),
             created_at_ms: 1_000,
             owner: SecretHash::of(b"owner"),

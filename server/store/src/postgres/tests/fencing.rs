@@ -52,9 +52,8 @@ impl Pair {
 #[tokio::test]
 async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
     let pair = Pair::new().await;
-    let room = Id::from_bytes([1; 16]);
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    let mut old = created.await.expect("created");
+    let room = id(1);
+    let mut old = created(&pair.first, 1).await;
     append(&mut old, 2).await.expect("committed");
     assert_eq!(pair.second.orphans(9).await, Ok(vec![]));
     assert_eq!(
@@ -86,8 +85,7 @@ async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
     assert!(!game.concluded);
     assert_eq!(numbers(&game.entries), [1, 2, 0]);
     append(&mut game.journal, 5).await.expect("committed");
-    let finished = game.journal.finish(Some(summary(1)), None);
-    finished.await.expect("committed");
+    finish(&mut game.journal, 1).await;
     let again = game.journal.finish(Some(summary(1)), None);
     again.await.expect("it is finished already");
     assert_eq!(pair.second.finished_games().await, Ok(1));
@@ -129,11 +127,10 @@ impl Late {
 #[tokio::test]
 async fn an_append_that_is_late_finds_its_place_taken() {
     let pair = Pair::new().await;
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    let old = created.await.expect("created");
+    let old = created(&pair.first, 1).await;
     pair.stall().await;
     let late = Late::new(&pair.database, old).await;
-    let room = Id::from_bytes([1; 16]);
+    let room = id(1);
     assert_eq!(pair.second.claim(room, FIRST).await, Ok(Some(SECOND)));
     assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
     let game = resumed(&pair.second, 1, SECOND).await;
@@ -146,13 +143,12 @@ async fn an_append_that_is_late_finds_its_place_taken() {
 async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
     let database = chefshat_postgres::database();
     let store = node(&database).await;
-    let created = store.create(durable(1), vec![entry(1)]);
-    created.await.expect("created");
+    created(&store, 1).await;
     let number = database.run("SELECT number FROM games");
     let row = |entry_number| {
         let owned = Owned {
-            id: Id::from_bytes([1; 16]),
-            unit: Id::from_bytes([1; 16]),
+            id: id(1),
+            unit: id(1),
             epoch: FIRST_EPOCH,
         };
         Arc::new(Row {
@@ -165,7 +161,7 @@ async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
     let mut connection = connected(&database).await;
     for again in [false, true] {
         let answers = Row::commit(&mut connection, &[row(2), row(3), row(2)], again).await;
-        let fenced = Err(StoreError::Fenced(Id::from_bytes([1; 16])));
+        let fenced = Err(StoreError::Fenced(id(1)));
         let answers = answers.expect("committed");
         let entries = numbers(&resumed(&store, 1, FIRST).await.entries);
         let expected = match entries[..] {
@@ -181,14 +177,12 @@ async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
 #[tokio::test]
 async fn an_append_that_is_late_does_not_follow_the_end_of_its_game() {
     let pair = Pair::new().await;
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    let old = created.await.expect("created");
+    let old = created(&pair.first, 1).await;
     let late = Late::new(&pair.database, old).await;
     // The same owner has read the room again, for example after its lease had expired.
     let mut game = resumed(&pair.first, 1, FIRST).await;
-    let finished = game.journal.finish(Some(summary(1)), None);
-    finished.await.expect("committed");
-    let room = Id::from_bytes([1; 16]);
+    finish(&mut game.journal, 1).await;
+    let room = id(1);
     assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
     let stored = pair
         .first
@@ -210,20 +204,18 @@ async fn nothing_is_written_over_a_hole() {
     let store = node(&database).await;
     let mut journals = Vec::new();
     for room in 1..=3 {
-        let created = store.create(durable(room), vec![entry(1)]);
-        let mut journal = created.await.expect("created");
+        let mut journal = created(&store, room).await;
         append(&mut journal, 2).await.expect("committed");
         journals.push(journal);
     }
-    let cup_id = Id::from_bytes([9; 16]);
-    let created = store.create_tournament(cup(9), begun());
-    created.await.expect("created");
+    let cup_id = id(9);
+    create_cup(&store, 9).await;
     let appended = store.append_tournament(cup_id, 1, begun());
     appended.await.expect("committed");
 
     database.run("DELETE FROM journal WHERE position = 1");
     database.run("DELETE FROM tournament_entries WHERE position = 1");
-    let lost = |room: u8| Err(StoreError::Lost(Id::from_bytes([room; 16])));
+    let lost = |room: u8| Err(StoreError::Lost(id(room)));
     assert_eq!(append(&mut journals[0], 3).await, lost(1));
     let finished = journals[1].finish(Some(summary(2)), None).await;
     assert_eq!(finished, lost(2));
@@ -250,9 +242,8 @@ async fn nothing_is_written_over_a_hole() {
 #[tokio::test]
 async fn of_many_claims_one_wins() {
     let pair = Pair::new().await;
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    created.await.expect("created");
-    let room = Id::from_bytes([1; 16]);
+    created(&pair.first, 1).await;
+    let room = id(1);
     let third = node(&pair.database).await;
     pair.first
         .release(room, FIRST, None)
@@ -275,9 +266,8 @@ async fn of_many_claims_one_wins() {
 async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
     let pair = Pair::new().await;
     for room in 1..=40 {
-        let created = pair.first.create(durable(room), vec![entry(1)]);
-        created.await.expect("created");
-        let released = pair.first.release(Id::from_bytes([room; 16]), FIRST, None);
+        created(&pair.first, room).await;
+        let released = pair.first.release(id(room), FIRST, None);
         released.await.expect("released");
     }
     let first = pair.first.orphans(10).await.expect("it answers");
@@ -293,8 +283,7 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
     let pair = Pair::new().await;
     let tournament = cup(9).id;
     let unit = tournament.unit();
-    let created = pair.first.create_tournament(cup(9), begun());
-    created.await.expect("created");
+    create_cup(&pair.first, 9).await;
     let room = |number| header(number, Some(9), Durability::Durable);
     let fenced = StoreError::Fenced(unit);
     let refused = pair.second.create(room(4), vec![entry(1)]).await;
@@ -306,15 +295,11 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
     }
     let ephemeral = header(3, Some(9), Durability::Ephemeral);
     pair.first.create(ephemeral, vec![]).await.expect("created");
-    let finished = journals[1].finish(Some(summary(2)), None);
-    finished.await.expect("committed");
+    finish(&mut journals[1], 2).await;
 
     pair.stall().await;
     assert_eq!(pair.second.orphans(9).await, Ok(vec![(unit, FIRST)]));
-    assert_eq!(
-        pair.second.claim(Id::from_bytes([1; 16]), FIRST).await,
-        Ok(None)
-    );
+    assert_eq!(pair.second.claim(id(1), FIRST).await, Ok(None));
     assert_eq!(pair.second.claim(unit, FIRST).await, Ok(Some(SECOND)));
     let late = pair.first.append_tournament(tournament, 1, begun());
     assert_eq!(late.await, Err(fenced.clone()));
@@ -340,14 +325,10 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
     added
         .await
         .expect("the tournament's new owner creates rooms");
-    let located = pair
-        .first
-        .locate(Id::from_bytes([6; 16]))
-        .await
-        .expect("readable");
+    let located = pair.first.locate(id(6)).await.expect("readable");
     let located = located.expect("known");
     assert_eq!((located.unit, located.epoch), (unit, SECOND));
-    let gone = pair.first.locate(Id::from_bytes([3; 16])).await;
+    let gone = pair.first.locate(id(3)).await;
     assert_eq!(gone, Ok(None), "ephemeral rooms die with their node");
     pair.close().await;
 }
@@ -355,8 +336,7 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
 #[tokio::test]
 async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     let pair = Pair::new().await;
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    let mut journal = created.await.expect("created");
+    let mut journal = created(&pair.first, 1).await;
     let created = pair.second.create_tournament(cup(9), vec![]);
     created.await.expect("created");
     let (room, cup) = (durable(1).room_id, cup(9).id);
@@ -372,22 +352,17 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
         let found = by_id.expect("known");
         assert_eq!((found.subject, found.node), (subject, Some(node)));
     }
-    assert_eq!(pair.first.locate(Id::from_bytes([7; 16])).await, Ok(None));
+    assert_eq!(pair.first.locate(id(7)).await, Ok(None));
     assert_eq!(pair.first.locate_code("NOTHING").await, Ok(None));
     let game = durable(1).game_id;
     let by_game = pair.second.locate_game(game).await.expect("readable");
     assert_eq!(by_game.expect("it runs").subject, of_room);
 
-    let finished = journal.finish(Some(summary(1)), None);
-    finished.await.expect("committed");
+    finish(&mut journal, 1).await;
     let found = pair.second.locate_code("ROOM1").await.expect("readable");
     assert!(found.expect("known").over);
     assert_eq!(pair.second.locate_game(game).await, Ok(None));
-    let shown = pair
-        .second
-        .ended_room(Id::from_bytes([1; 16]))
-        .await
-        .expect("readable");
+    let shown = pair.second.ended_room(id(1)).await.expect("readable");
     assert!(shown.expect("stored").concluded);
     // Another room may have the code from now on.
     let next = GameHeader {
@@ -404,11 +379,8 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     // In the end nothing is left of the first room but its record.
     advance(&pair.database, 600_001);
     pair.first.tidy().await.expect("it answers");
-    assert_eq!(pair.first.locate(Id::from_bytes([1; 16])).await, Ok(None));
-    assert!(matches!(
-        pair.first.ended_room(Id::from_bytes([1; 16])).await,
-        Ok(None)
-    ));
+    assert_eq!(pair.first.locate(id(1)).await, Ok(None));
+    assert!(matches!(pair.first.ended_room(id(1)).await, Ok(None)));
     assert_eq!(pair.first.finished_games().await, Ok(1));
     pair.close().await;
 }
@@ -420,20 +392,16 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
     // Of before the node joined.
     database.run("DELETE FROM nodes; ALTER TABLE nodes ALTER COLUMN node RESTART");
     let after = node(&database).await;
-    let created = after.create(durable(1), vec![entry(1)]);
-    let mut journal = created.await.expect("created");
+    let mut journal = created(&after, 1).await;
     assert_eq!(
         before.beat(REACHED).await,
         Ok(None),
         "it is no node any more"
     );
-    assert_eq!(before.claim(Id::from_bytes([1; 16]), FIRST).await, Ok(None));
+    assert_eq!(before.claim(id(1), FIRST).await, Ok(None));
     assert_eq!(before.leave().await, Ok(false));
     let beat = after.beat(REACHED).await.expect("it answers");
-    assert_eq!(
-        beat.expect("it is known").owned,
-        [(Id::from_bytes([1; 16]), FIRST)]
-    );
+    assert_eq!(beat.expect("it is known").owned, [(id(1), FIRST)]);
     append(&mut journal, 2).await.expect("committed");
     drop(journal);
     for store in [before, after] {
@@ -444,11 +412,10 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
 #[tokio::test]
 async fn a_node_that_died_before_the_clock_was_set_back_is_survived() {
     let pair = Pair::new().await;
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    created.await.expect("created");
+    created(&pair.first, 1).await;
     pair.database
         .run("UPDATE test_clock SET now_ms = now_ms - 900000");
-    for orphans in [vec![], vec![(Id::from_bytes([1; 16]), FIRST)]] {
+    for orphans in [vec![], vec![(id(1), FIRST)]] {
         pair.second.beat(REACHED).await.expect("it answers");
         assert_eq!(pair.second.orphans(9).await, Ok(orphans));
         pair.second.tidy().await.expect("it answers");
@@ -464,8 +431,7 @@ async fn nodes_that_live_are_listed_first() {
     database.run("UPDATE nodes SET beat_ms = beat_ms - 3600000");
     let living = [node(&database).await, node(&database).await];
     let nodes = living[0].nodes().await.expect("readable");
-    let created = lost.create(durable(1), vec![entry(1)]);
-    created.await.expect("created");
+    created(&lost, 1).await;
     let created = living[0].create_tournament(cup(9), vec![]);
     created.await.expect("created");
     let of_nobody = living[1].without_node().await.expect("readable");
@@ -482,15 +448,14 @@ async fn nodes_that_live_are_listed_first() {
 async fn a_node_is_listed_drained_and_leaves() {
     let pair = Pair::new().await;
     let node = number_of(&pair.first);
-    let created = pair.first.create(durable(1), vec![entry(1)]);
-    created.await.expect("created");
+    created(&pair.first, 1).await;
     assert_eq!(pair.first.leave().await, Ok(false), "it owns a room");
     assert_eq!(pair.second.request_drain(node).await, Ok(true));
     assert_eq!(pair.second.request_drain(NodeId(99)).await, Ok(false));
     let beat = pair.first.beat(REACHED).await.expect("it answers");
     let beat = beat.expect("it is known");
     assert!(beat.drain);
-    assert_eq!(beat.owned, [(Id::from_bytes([1; 16]), FIRST)]);
+    assert_eq!(beat.owned, [(id(1), FIRST)]);
     let nodes = pair.second.nodes().await.expect("readable");
     let listed: Vec<_> = (nodes.iter())
         .map(|node| (node.id, node.rooms, node.drain, node.expired))
@@ -508,16 +473,13 @@ async fn a_node_is_listed_drained_and_leaves() {
         "it has just joined"
     );
     assert!(nodes.iter().all(|it| it.reached == (it.id == node)));
-    let released = pair.first.release(Id::from_bytes([1; 16]), FIRST, None);
+    let released = pair.first.release(id(1), FIRST, None);
     released.await.expect("released");
     assert_eq!(pair.first.leave().await, Ok(true));
     assert_eq!(pair.first.beat(REACHED).await, Ok(None));
     let refused = pair.first.create(durable(2), vec![entry(1)]).await;
-    assert_eq!(
-        refused.err(),
-        Some(StoreError::Fenced(Id::from_bytes([2; 16])))
-    );
-    let claimed = pair.first.claim(Id::from_bytes([1; 16]), FIRST).await;
+    assert_eq!(refused.err(), Some(StoreError::Fenced(id(2))));
+    let claimed = pair.first.claim(id(1), FIRST).await;
     assert_eq!(claimed, Ok(None), "it is no node any more");
     pair.close().await;
 }
@@ -534,15 +496,13 @@ async fn broken_connections_lose_and_double_nothing() {
         .map(|room| {
             let (store, mut up_to) = (Arc::clone(&store), up_to.clone());
             tokio::spawn(async move {
-                let created = store.create(durable(room), vec![entry(1)]);
-                let mut journal = created.await.expect("created");
+                let mut journal = created(&store, room).await;
                 for number in 2..=APPENDS {
                     let allowed = up_to.wait_for(|up_to| number <= *up_to);
                     allowed.await.expect("the test goes on");
                     append(&mut journal, number).await.expect("committed");
                 }
-                let finished = journal.finish(Some(summary(room)), None);
-                finished.await.expect("committed");
+                finish(&mut journal, room).await;
             })
         })
         .collect();
@@ -571,11 +531,7 @@ async fn broken_connections_lose_and_double_nothing() {
     }
     let all: Vec<u64> = (1..=APPENDS).collect();
     for room in 1..=ROOMS {
-        let stored = store.finished(Id::from_bytes([room; 16])).await;
-        let Ok(Some(StoredGame::Hosted(_, entries, _))) = stored else {
-            panic!("{stored:?}");
-        };
-        assert_eq!(numbers(&entries), all);
+        assert_eq!(numbers(&ended(&*store, id(room)).await), all);
     }
     let listed = "SELECT string_agg(listed::text, ' ' ORDER BY listed) FROM games";
     assert_eq!(database.run(listed), "1 2 3 4 5 6 7 8");
@@ -589,8 +545,7 @@ async fn a_cursor_misses_no_game_that_nodes_finish_at_the_same_time() {
     let mut finishing = Vec::new();
     for room in 1..=40 {
         let store = [&first, &second][usize::from(room % 2)];
-        let created = store.create(durable(room), vec![entry(1)]);
-        let mut journal = created.await.expect("created");
+        let mut journal = created(&store, room).await;
         finishing.push(tokio::spawn(async move {
             journal.finish(Some(summary(room)), None).await
         }));
@@ -619,8 +574,7 @@ async fn stopped(retry_for: Duration) -> (Server, PostgresStore, Box<dyn Journal
         ..PostgresOptions::default()
     };
     let store = node_with(&server.database(), options).await;
-    let created = store.create(durable(1), vec![entry(1)]).await;
-    let mut journal = created.expect("created");
+    let mut journal = created(&store, 1).await;
     append(&mut journal, 2).await.expect("committed");
     server.stop();
     assert!(store.beat(REACHED).await.is_err(), "nobody answers");

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::*;
 use chefshat_postgres::Server;
+use chefshat_room::ids::Id;
 
 /// Ends of games are numbered in the order of their commits, by one row of the database.
 #[tokio::test(flavor = "multi_thread")]

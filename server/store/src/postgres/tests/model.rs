@@ -71,10 +71,6 @@ struct Worlds {
     written: u64,
 }
 
-fn id(number: u8) -> UnitId {
-    Id::from_bytes([number; 16])
-}
-
 fn tournament_of(room: u8) -> u8 {
     room - room % 10
 }

@@ -33,16 +33,6 @@ fn partitions(database: &Database) -> String {
     )
 }
 
-/// Creates and ends a game of a room, whose record has been written to a file.
-async fn played(store: &PostgresStore, room: u8) {
-    let created = store.create(durable(room), vec![entry(1)]).await;
-    let mut journal = created.expect("created");
-    let finished = journal.finish(Some(summary(room)), None).await;
-    finished.expect("committed");
-    let written = store.mark_record_written(durable(room).game_id).await;
-    written.expect("committed");
-}
-
 /// As if this many partitions had been filled and their games deleted.
 fn filled(database: &Database, partitions: u32) {
     let number = 262_144 * partitions;

@@ -15,17 +15,12 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     let first = node(&database).await;
     stop_clock(&database);
     let second = node(&database).await;
-    let created = first.create_tournament(cup(9), begun());
-    created.await.expect("created");
+    create_cup(&first, 9).await;
     for (room, tournament) in [(1, Some(9)), (2, None), (3, None)] {
         let header = header(room, tournament, Durability::Durable);
-        let created = first.create(header, vec![entry(1)]).await;
-        let finished = created
-            .expect("created")
-            .finish(Some(summary(room)), None)
-            .await;
-        finished.expect("committed");
-        let written = first.mark_record_written(Id::from_bytes([room; 16]));
+        let mut journal = begin(&first, &header, vec![entry(1)]).await;
+        finish(&mut journal, room).await;
+        let written = first.mark_record_written(id(room));
         written.await.expect("committed");
     }
     assert_eq!(prunable(&second).await, [2]);
@@ -34,19 +29,19 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     advance(&database, 600_001);
     first.beat(REACHED).await.expect("it answers");
     second.tidy().await.expect("it answers");
-    assert_eq!(second.locate(Id::from_bytes([2; 16])).await, Ok(None));
+    assert_eq!(second.locate(id(2)).await, Ok(None));
     assert_eq!(prunable(&second).await, [2]);
     // Its owner does not read them all when it resumes it.
-    let unit = first.load(Id::from_bytes([9; 16]), Epoch::FIRST).await;
+    let unit = first.load(id(9), Epoch::FIRST).await;
     let unit = unit.expect("readable").expect("it is owned");
     assert_eq!(unit.games.len(), 0);
 
     let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
-    let ended = first.append_tournament(Id::from_bytes([9; 16]), 1, end);
+    let ended = first.append_tournament(id(9), 1, end);
     ended.await.expect("committed");
     assert_eq!(prunable(&second).await, [1, 2]);
     second.tidy().await.expect("it answers");
-    assert_eq!(second.locate(Id::from_bytes([1; 16])).await, Ok(None));
+    assert_eq!(second.locate(id(1)).await, Ok(None));
     first.close().await;
     second.close().await;
 }
@@ -56,21 +51,13 @@ async fn a_game_with_a_damaged_id_does_not_hide_the_others() {
     let database = chefshat_postgres::database();
     let store = node(&database).await;
     for room in [1, 2, 3] {
-        let created = store.create(durable(room), vec![entry(1)]).await;
-        let mut journal = created.expect("created");
-        let finished = journal.finish(Some(summary(room)), None).await;
-        finished.expect("committed");
-        let written = store.mark_record_written(Id::from_bytes([room; 16]));
-        written.await.expect("committed");
+        played(&store, room).await;
     }
     database
         .run("UPDATE games SET game_id = 'damaged' WHERE number = (SELECT min(number) FROM games)");
     let found = store.prunable(Keep::default(), 0, 1).await;
-    let found = found.expect("readable");
-    assert_eq!(
-        found.iter().map(|(_, game)| *game).collect::<Vec<_>>(),
-        [Id::from_bytes([2; 16])]
-    );
+    let found = found.expect("readable").into_iter();
+    assert_eq!(Vec::from_iter(found.map(|(_, game)| game)), [id(2)]);
     store.close().await;
 }
 
@@ -81,11 +68,9 @@ async fn a_record_takes_no_id_of_a_game_that_another_node_plays() {
     for (room, durability) in [(1, Durability::Ephemeral), (2, Durability::Durable)] {
         let played = header(room, None, durability);
         let import = || second.import(played.game_id, *summary(room), Arc::from([]));
-        let created = first.create(Arc::clone(&played), vec![entry(1)]).await;
-        let mut journal = created.expect("created");
+        let mut journal = begin(&first, &played, vec![entry(1)]).await;
         assert_eq!(import().await, Ok(false));
-        let finished = journal.finish(Some(summary(room)), None).await;
-        finished.expect("committed");
+        finish(&mut journal, room).await;
         assert_eq!(import().await, Ok(false));
         let stored = second.finished(played.game_id).await.expect("readable");
         assert!(matches!(stored, Some(StoredGame::Hosted(..))));
@@ -137,43 +122,5 @@ async fn a_record_and_a_game_take_one_id_only_once_at_the_same_time() {
         assert_eq!(taken, (true, false), "import first: {import_first}");
         first.close().await;
         second.close().await;
-    }
-}
-
-#[tokio::test]
-async fn games_of_what_cannot_be_read_are_kept() {
-    for (damage, kept) in [
-        ("SELECT 1", false),
-        ("UPDATE tournaments SET form = 99", true),
-        ("UPDATE tournament_entries SET entries = '\\xff'", true),
-        ("UPDATE games SET header = '\\xff'", true),
-        ("UPDATE games SET form = 99", true),
-    ] {
-        let database = chefshat_postgres::database();
-        let store = node(&database).await;
-        let created = store.create_tournament(cup(9), begun()).await;
-        created.expect("created");
-        for room in [1, 2] {
-            let header = header(room, Some(9), Durability::Durable);
-            let created = store.create(header, vec![entry(1)]).await;
-            let mut journal = created.expect("created");
-            let finished = journal.finish(Some(summary(room)), None).await;
-            finished.expect("committed");
-            let written = store.mark_record_written(Id::from_bytes([room; 16])).await;
-            written.expect("committed");
-        }
-        let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
-        let ended = store
-            .append_tournament(Id::from_bytes([9; 16]), 1, end)
-            .await;
-        ended.expect("committed");
-        run(&mut connected(&database).await, damage).await;
-        assert_eq!(prunable(&store).await.is_empty(), kept, "{damage}");
-        store
-            .prune(vec![Id::from_bytes([1; 16])])
-            .await
-            .expect("committed");
-        assert_eq!(store.finished_games().await, Ok(1 + u64::from(kept)));
-        store.close().await;
     }
 }

@@ -92,7 +92,7 @@ async fn what_an_earlier_attempt_still_commits_counts_as_done() {
     let (created, ()) = futures::join!(created, overtake(&line, &mut holder));
     assert_eq!(created, Ok(()));
     run(&mut holder, "SELECT pg_advisory_lock(1)").await;
-    let appended = store.append_tournament(Id::from_bytes([9; 16]), 1, begun());
+    let appended = store.append_tournament(id(9), 1, begun());
     let (appended, ()) = futures::join!(appended, overtake(&line, &mut holder));
     assert_eq!(appended, Ok(()));
     assert_eq!(tournament_rows(&store, 9).await, 2);
@@ -206,9 +206,8 @@ async fn what_stands_is_acknowledged_when_the_standby_has_it() {
     let [appending, finishing, ephemeral] = &mut journals[..] else {
         unreachable!("there are three");
     };
-    let created = store.create_tournament(cup(9), begun());
-    created.await.expect("created");
-    let importing = store.import(Id::from_bytes([7; 16]), *summary(7), Arc::from([]));
+    create_cup(&store, 9).await;
+    let importing = store.import(id(7), *summary(7), Arc::from([]));
     let works: [(_, BoxFuture<'_, Result<(), StoreError>>); 7] = [
         ("a row", append(appending, 2).boxed()),
         ("an end", finishing.finish(Some(summary(2)), None)),
@@ -220,7 +219,7 @@ async fn what_stands_is_acknowledged_when_the_standby_has_it() {
         ("a tournament", store.create_tournament(cup(8), begun())),
         (
             "a tournament's row",
-            store.append_tournament(Id::from_bytes([9; 16]), 1, begun()),
+            store.append_tournament(id(9), 1, begun()),
         ),
         (
             "an import",
@@ -254,8 +253,7 @@ async fn commits_wait_for_the_standby_whatever_the_database_is_set_to() {
         let before = format!("ALTER DATABASE {name} SET synchronous_commit = {setting}");
         primary.database.run(&before);
         let store = node(&primary.database).await;
-        let created = store.create(durable(1), vec![entry(1)]).await;
-        let mut journal = created.expect("created");
+        let mut journal = created(&store, 1).await;
         primary
             .database
             .run(&format!("ALTER DATABASE {name} RESET ALL"));
@@ -346,8 +344,7 @@ async fn one_row_that_cannot_be_written_does_not_hold_up_others() {
     let store = node(&database).await;
     let mut journals = Vec::new();
     for room in 1..=ROOMS {
-        let created = store.create(durable(room), vec![entry(1)]).await;
-        journals.push(created.expect("created"));
+        journals.push(created(&store, room).await);
     }
     // As on a damaged page.
     database.run(
@@ -421,8 +418,7 @@ async fn locked(options: PostgresOptions) -> (Database, PostgresStore, Journals,
     let store = node_with(&database, options).await;
     let mut journals = Vec::new();
     for room in 1..=6 {
-        let created = store.create(durable(room), vec![entry(1)]);
-        journals.push(created.await.expect("created"));
+        journals.push(created(&store, room).await);
     }
     let locked = "TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW WHEN (NEW.game <= 2)";
     let holder = hold(&database, locked).await;

@@ -9,6 +9,7 @@ use crate::testing::folded;
 use crate::tournaments::StoredTournament;
 use crate::{DATABASE_FILE, OpenError, SqliteStore};
 use chefshat_room::Core;
+use chefshat_room::ids::Id;
 
 /// A folder with the database that an earlier version wrote.
 fn earlier_version() -> tempfile::TempDir {
@@ -199,7 +200,7 @@ async fn a_name_that_no_index_takes_does_not_prevent_a_move() {
         }],
         ..*summary(1)
     };
-    let imported = source.import(Id::from_bytes([1; 16]), long, Arc::from([]));
+    let imported = source.import(id(1), long, Arc::from([]));
     assert_eq!(imported.await, Ok(true));
     source.close().await;
     drop(source);

@@ -33,7 +33,7 @@ async fn committed(reply: Reply) {
 fn imported(number: u8) -> WriteCommand {
     WriteCommand::Import {
         number: i64::from(number),
-        game_id: Id::from_bytes([number; 16]),
+        game_id: id(number),
         record: vec![number; 400_000],
         summary: Box::new(v1::RecordSummary {
             state: v1::RoomState::Finished.into(),
@@ -74,7 +74,7 @@ async fn deletions_go_first_while_the_disk_is_full() {
     for game in [1, 2] {
         committed(send(&commands, imported(game)).await).await;
     }
-    let study = UnitKey::Study(Id::from_bytes([9; 16]));
+    let study = UnitKey::Study(id(9));
     let create = UnitWrite::Create {
         join_code: None,
         header: Vec::new(),
@@ -88,7 +88,7 @@ async fn deletions_go_first_while_the_disk_is_full() {
     let delete = WriteCommand::Unit(study, UnitWrite::Delete);
     committed(send(&commands, delete).await).await;
     assert!(third.try_recv().is_err() && fourth.try_recv().is_err());
-    let games = vec![Id::from_bytes([1; 16]), Id::from_bytes([2; 16])];
+    let games = vec![id(1), id(2)];
     committed(send(&commands, WriteCommand::Prune { games }).await).await;
     committed(third).await;
     committed(fourth).await;
@@ -120,7 +120,7 @@ async fn deletions_go_first_however_many_rooms_wait() {
         };
         rooms.push(send(&commands, WriteCommand::Append(row)).await);
     }
-    let games = vec![Id::from_bytes([1; 16]), Id::from_bytes([2; 16])];
+    let games = vec![id(1), id(2)];
     committed(send(&commands, WriteCommand::Prune { games }).await).await;
     committed(third).await;
     for room in rooms {

@@ -5,7 +5,7 @@ use super::*;
 #[tokio::test]
 async fn unusable_files_are_refused_and_left_unchanged() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join(super::super::errors::FILE);
+    let file = folder.path().join(DATABASE_FILE);
     let refusal = async |what: &str| {
         let before = std::fs::read(&file).expect("the file exists");
         let refused = SqliteStore::open(folder.path()).await;
@@ -27,33 +27,16 @@ async fn unusable_files_are_refused_and_left_unchanged() {
     assert!(matches!(error, OpenError::NotOurs(_)), "{error}");
     std::fs::remove_file(&file).expect("removed");
 
-    let options = SqliteConnectOptions::new()
-        .filename(&file)
-        .create_if_missing(true);
-    let mut other = SqliteConnection::connect_with(&options)
-        .await
-        .expect("made");
-    other
-        .execute("CREATE TABLE recipes (name TEXT)")
-        .await
-        .expect("done");
-    other.close().await.expect("closed");
+    edit(folder.path(), "CREATE TABLE recipes (name TEXT)").await;
     let error = refusal("another program's database").await;
     assert!(matches!(error, OpenError::NotOurs(_)), "{error}");
     std::fs::remove_file(&file).expect("removed");
 
     opened(folder.path()).await.close().await;
-    let mut connection = SqliteConnection::connect_with(&options)
-        .await
-        .expect("ours");
-    connection
-        .execute(
-            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
-             VALUES (9999, 'of the future', 1, x'00', 0)",
-        )
-        .await
-        .expect("done");
-    connection.close().await.expect("closed");
+    let migrated =
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'of the future', 1, x'00', 0)";
+    edit(folder.path(), migrated).await;
     let error = refusal("a database of a newer version").await;
     assert!(matches!(error, OpenError::Newer(_)), "{error}");
     assert!(error.to_string().contains("newer version"), "{error}");
@@ -72,14 +55,14 @@ async fn a_database_with_only_its_log_left_is_not_recreated() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Durable));
-    let mut journal = store.create(header, Vec::new()).await.expect("committed");
+    let mut journal = begin(&store, &header, Vec::new()).await;
     journal.append(&mut entries()).await.expect("committed");
     // The process dies with most of its data in the write-ahead log.
     let copy = tempfile::tempdir().expect("a folder");
     for name in ["games.sqlite3", "games.sqlite3-wal"] {
         std::fs::copy(folder.path().join(name), copy.path().join(name)).expect("copied");
     }
-    std::fs::write(copy.path().join(super::super::errors::FILE), "").expect("cut off");
+    std::fs::write(copy.path().join(DATABASE_FILE), "").expect("cut off");
     let log = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
     assert!(!log.is_empty());
     let refused = SqliteStore::open(copy.path()).await;
@@ -116,7 +99,7 @@ async fn a_lost_database_is_not_replaced_by_an_empty_one() {
                     false => std::fs::write(path, text).expect("written"),
                 }
             }
-            let file = folder.path().join(super::super::errors::FILE);
+            let file = folder.path().join(DATABASE_FILE);
             if empty.is_some() {
                 std::fs::write(&file, "").expect("written");
             }
@@ -145,11 +128,11 @@ async fn a_database_that_is_lost_between_two_starts_is_missed() {
     for lose in ["remove", "empty", tables_lost] {
         let folder = tempfile::tempdir().expect("a folder");
         opened(folder.path()).await.close().await;
-        let file = folder.path().join(super::super::errors::FILE);
+        let file = folder.path().join(DATABASE_FILE);
         match lose {
             "remove" => std::fs::remove_file(&file).expect("removed"),
             "empty" => std::fs::write(&file, "").expect("emptied"),
-            statement => super::edit(folder.path(), statement).await,
+            statement => edit(folder.path(), statement).await,
         }
         let refused = SqliteStore::open(folder.path()).await;
         let error = refused.err().expect("it is missed");
@@ -164,7 +147,7 @@ async fn games_abandoned_before_the_deal_leave_nothing_behind() {
     let store = opened(folder.path()).await;
     for game in 1..=2 {
         let header = Arc::new(header(game, Durability::Durable));
-        let mut journal = store.create(header, Vec::new()).await.expect("committed");
+        let mut journal = begin(&store, &header, Vec::new()).await;
         journal.append(&mut entries()).await.expect("committed");
         if game == 1 {
             journal.finish(None, None).await.expect("committed");
@@ -173,11 +156,7 @@ async fn games_abandoned_before_the_deal_leave_nothing_behind() {
     store.close().await;
     drop(store);
     opened(folder.path()).await.close().await;
-    let options =
-        SqliteConnectOptions::new().filename(folder.path().join(super::super::errors::FILE));
-    let mut connection = SqliteConnection::connect_with(&options)
-        .await
-        .expect("ours");
+    let mut connection = connected(folder.path()).await;
     for table in ["games", "journal"] {
         let count = format!("SELECT count(*) FROM {table}");
         let rows: i64 = sqlx::query_scalar(sqlx::AssertSqlSafe(count))
@@ -214,10 +193,7 @@ async fn a_process_that_is_just_starting_does_not_keep_a_folder_locked() {
 #[tokio::test]
 async fn the_copy_of_every_database_can_shrink() {
     let vacuum = async |folder: &Path, text: &'static str| -> i64 {
-        let options = SqliteConnectOptions::new().filename(folder.join(super::super::errors::FILE));
-        let mut database = SqliteConnection::connect_with(&options)
-            .await
-            .expect("ours");
+        let mut database = connected(folder).await;
         database.execute(text).await.expect("done");
         let mode = sqlx::query_scalar("PRAGMA auto_vacuum")
             .fetch_one(&mut database)
