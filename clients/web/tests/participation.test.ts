@@ -12,7 +12,7 @@ import {
 } from "../src/gen/chefshat/v1/play_service_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { setLanguage } from "../src/i18n";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { refusedWords } from "../src/table/words";
 import { startParticipation } from "../src/tournaments/participation";
 import { AWAY } from "./refusals";

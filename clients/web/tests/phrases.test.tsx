@@ -5,7 +5,7 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { type Gesture, PHRASES, type Phrase, phraseGesture, phraseOf, shownLabel } from "../src/table/expressions";
 import { Expressions } from "../src/table/view/Tools";
 import { root, type } from "./mounted";

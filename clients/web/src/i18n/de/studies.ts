@@ -1,6 +1,6 @@
 // German texts of studies, in studies/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("de");

@@ -2,7 +2,7 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { numerals, plurals } from "../plural";
 
 const plural = plurals("de");

@@ -1,6 +1,6 @@
 // Spanish texts of attend/: the attendant of a table with real cards.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("es");

@@ -3,7 +3,7 @@
 // "mano", play "jugar", "jugada", pass "pasar", declare "declarar", exchange "intercambio", game
 // "partida".
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { ordinals, plurals } from "../plural";
 
 const plural = plurals("es");

@@ -1,6 +1,6 @@
 // Spanish texts of creating and running a tournament, in tournaments/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("es");

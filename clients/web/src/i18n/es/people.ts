@@ -1,6 +1,6 @@
 // Spanish texts of people/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("es");

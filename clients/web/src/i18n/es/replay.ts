@@ -1,6 +1,6 @@
 // Spanish texts of replay/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const replay: Texts["replay"] = {
   title: "Repetición",

@@ -1,6 +1,6 @@
 // Spanish texts of tutorial/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const tutorial: Texts["tutorial"] = {
   title: "Aprende a jugar",

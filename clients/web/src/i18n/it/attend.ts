@@ -1,6 +1,6 @@
 // Italian texts of attend/: chi assiste a un tavolo con carte vere.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("it");

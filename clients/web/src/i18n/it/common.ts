@@ -1,7 +1,7 @@
 // Italian texts that several parts of the page use: the frame, kinds of participants, words of the
 // game.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { ordinals, plurals } from "../plural";
 
 const plural = plurals("it");

@@ -1,6 +1,6 @@
 // Italian texts of lobby/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 import { time } from "./time";
 

@@ -1,6 +1,6 @@
 // Italian texts of people/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { plurals } from "../plural";
 
 const plural = plurals("it");

@@ -1,6 +1,6 @@
 // Italian texts of replay/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const replay: Texts["replay"] = {
   title: "Replay",

@@ -1,6 +1,6 @@
 // Italian texts of tutorial/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const tutorial: Texts["tutorial"] = {
   title: "Impara a giocare",
