@@ -92,32 +92,26 @@ def test_a_game_over_one_blocking_stream(real_address: str) -> None:
         assert watched == next(iter(agents.values())).sequences[-len(watched) :]
 
 
-def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
-    async def run() -> None:
-        async with aio.Client(real_address) as client:
-            room = await client.rooms.create("asyncio")
-            agents = {}
-            for number in range(4):
-                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
-            check(agents, await client.play_many(agents))
-
-    asyncio.run(run())
+async def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
+    async with aio.Client(real_address) as client:
+        room = await client.rooms.create("asyncio")
+        agents = {}
+        for number in range(4):
+            agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
+        check(agents, await client.play_many(agents))
 
 
-def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
-    async def run() -> None:
-        async with aio.Client(real_address) as client:
-            room = await client.rooms.create("four streams", rules=pb.RuleSet(target_shifts=2))
-            agents = {}
-            for number in range(4):
-                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
-            games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
-            results: dict[str, chefshat.SeatResult] = {}
-            for result in await asyncio.gather(*games):
-                results |= result
-            check(agents, results)
-
-    asyncio.run(run())
+async def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
+    async with aio.Client(real_address) as client:
+        room = await client.rooms.create("four streams", rules=pb.RuleSet(target_shifts=2))
+        agents = {}
+        for number in range(4):
+            agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
+        games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
+        results: dict[str, chefshat.SeatResult] = {}
+        for result in await asyncio.gather(*games):
+            results |= result
+        check(agents, results)
 
 
 def test_a_game_of_four_processes(real_address: str, processes: list[subprocess.Popen[str]]) -> None:
