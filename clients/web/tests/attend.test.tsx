@@ -3,7 +3,7 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 import { tableApi } from "../src/api/client";
 import { secretsFor } from "../src/api/secrets";
 import { AttendPage } from "../src/attend/AttendPage";
@@ -25,8 +25,6 @@ beforeEach(() => {
   sent = [];
   outcome = { kind: "accepted" };
 });
-
-afterEach(() => void vi.restoreAllMocks());
 
 const show = (state: TableState) =>
   act(() =>

@@ -65,8 +65,6 @@ beforeEach(() => {
 });
 
 afterEach(() => {
-  vi.unstubAllGlobals();
-  vi.restoreAllMocks();
   for (const name of ["vibrate", "userActivation", "wakeLock", "serviceWorker"])
     Reflect.deleteProperty(navigator, name);
   for (const name of ["tab", "vibration", "awake"] as const) setPreference(name, true);

@@ -4,7 +4,7 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { tournamentApi } from "../src/api/client";
 import { TournamentGameState, TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import {
@@ -18,7 +18,7 @@ import {
 } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { t } from "../src/i18n";
 import { WhichOne } from "../src/lobby/WhichOne";
-import { forgetAll, remember } from "../src/store";
+import { remember } from "../src/store";
 import { ManageGames, ManageParticipants, Pause } from "../src/tournaments/ByHand";
 import { hostedTournament, placeLinks, removeParticipant, replaceByPerson } from "../src/tournaments/hosting";
 import { button, press, root, settle } from "./mounted";
@@ -29,10 +29,6 @@ const OWNER = { tournamentId: ID, ownerToken: "cd".repeat(48) };
 
 beforeEach(() => {
   remember(`organised.${ID}`, JSON.stringify({ joinCode: "ABCD", ownerToken: OWNER.ownerToken }));
-});
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 const tournament = (names: readonly string[], state = TournamentState.OPEN) =>

@@ -5,7 +5,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { analysisApi, recordApi } from "../src/api/client";
 import { EvaluateResponseSchema } from "../src/gen/chefshat/v1/analysis_service_pb";
 import { GetRecordResponseSchema } from "../src/gen/chefshat/v1/record_service_pb";
@@ -19,8 +19,6 @@ import { legalActions } from "../src/table/model/actions";
 import { eventually, root, settle } from "./mounted";
 import { recorded } from "./record";
 import { AWAY, refused } from "./refusals";
-
-afterEach(() => vi.restoreAllMocks());
 
 const FILM = filmOf(recorded("fixed"));
 const ALL = choices(FILM);

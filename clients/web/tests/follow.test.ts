@@ -2,19 +2,14 @@
 // good.
 
 import { Code, ConnectError, type UnaryRequest, type UnaryResponse } from "@connectrpc/connect";
-import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { wordsOf } from "../src/api/faults";
 import { askHeartbeats, follow } from "../src/api/follow";
 import { setLanguage } from "../src/i18n";
 import { AWAY, tooMany } from "./refusals";
 
 beforeAll(() => setLanguage("en"));
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** A stream of these messages that then throws or ends. */
 async function* stream(messages: readonly string[], thrown?: unknown): AsyncGenerator<string> {

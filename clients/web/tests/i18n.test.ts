@@ -91,9 +91,6 @@ describe("texts that come late or not at all", () => {
   });
   afterEach(() => {
     vi.doUnmock("../src/i18n/de");
-    vi.unstubAllGlobals();
-    vi.useRealTimers();
-    localStorage.clear();
   });
 
   test("of two languages the one that was chosen last is shown", async () => {

@@ -4,7 +4,7 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { roomApi, tournamentApi } from "../src/api/client";
 import { ParticipantSchema, RoomState, Visibility } from "../src/gen/chefshat/v1/room_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
@@ -12,7 +12,6 @@ import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tourna
 import { GetTournamentResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { t } from "../src/i18n";
 import { Join } from "../src/lobby/Join";
-import { forgetAll } from "../src/store";
 import { TournamentPage } from "../src/tournaments/TournamentPage";
 import { root } from "./mounted";
 import { AWAY, refused } from "./refusals";
@@ -33,12 +32,6 @@ const tournament = () =>
 
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
-});
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-  forgetAll();
-  history.replaceState(null, "", "/");
 });
 
 async function pass(ms: number) {

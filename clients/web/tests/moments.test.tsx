@@ -34,11 +34,7 @@ const gift = (giver: number, receiver: number): Kind => {
   return { case: "cardsExchanged", value: { giver, receiver, count: 2 } };
 };
 
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  setPreference("moments", true);
-});
+afterEach(() => setPreference("moments", true));
 
 test.each<[string, Kind[], string | undefined]>([
   ["the Golden card opens a Shift", [deal, play(1, 11, 2, 15)], "opening"],

@@ -3,7 +3,7 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
 import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
@@ -45,7 +45,6 @@ beforeEach(async () => {
   table = emptyTable((stateOf().room?.seats ?? []).map(seatFromParticipant));
   await act(() => render(<Table table={table} />, root));
 });
-afterEach(() => vi.useRealTimers());
 
 test("a deal goes to every seat but the reader's, whose hand shows it, and arrives", async () => {
   await happens(deal);

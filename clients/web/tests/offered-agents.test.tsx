@@ -4,12 +4,12 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { serverApi } from "../src/api/client";
 import { GetServerInfoResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import { NewRoom } from "../src/lobby/NewRoom";
-import { forgetAll, remember } from "../src/store";
+import { remember } from "../src/store";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
 import { NewTournament } from "../src/tournaments/NewTournament";
 import { Organiser } from "../src/tournaments/Organiser";
@@ -26,10 +26,6 @@ beforeEach(() => {
       quickBuiltInAgents: AGENTS.filter((agent) => agent !== "search"),
     }),
   );
-});
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 const organised = {

@@ -4,7 +4,7 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { serverApi, tournamentApi } from "../src/api/client";
 import { GetClockResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import {
@@ -20,23 +20,10 @@ import {
 } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { Countdown, clockOf } from "../src/tournaments/Countdown";
 import { nextOf, OwnPlace } from "../src/tournaments/OwnPlace";
-import {
-  decidePlace,
-  forgetPlace,
-  type HeldPlace,
-  heldPlace,
-  linkToPlace,
-  placeFromLink,
-} from "../src/tournaments/place";
+import { decidePlace, type HeldPlace, heldPlace, linkToPlace, placeFromLink } from "../src/tournaments/place";
 import { button, press, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
-
-beforeEach(() => forgetPlace(ID));
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
 
 const BO: HeldPlace = { ticket: `${ID}${"ab".repeat(32)}`, participant: 3, name: "Bo & Çem" };
 const ADA: HeldPlace = { ticket: `${ID}${"cd".repeat(32)}`, participant: 1, name: "Ada" };

@@ -6,7 +6,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import { beforeAll, expect, test, vi } from "vitest";
 import { serverApi } from "../src/api/client";
 import { AbortPolicy, ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { PassScope } from "../src/gen/chefshat/v1/rules_pb";
@@ -36,7 +36,6 @@ import {
 import { setLanguage, startLanguage, t } from "../src/i18n";
 import { zipped } from "../src/parts/zip";
 import { navigate, route } from "../src/router";
-import { forgetAll } from "../src/store";
 import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
@@ -53,10 +52,6 @@ const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TOKEN = "ab".repeat(48);
 
 beforeAll(startLanguage);
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
-});
 
 const study = create(StudySchema, {
   studyId: ID,

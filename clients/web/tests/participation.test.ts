@@ -3,7 +3,7 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
 import {
   DetachReason,
@@ -27,13 +27,7 @@ const seated: Update = {
 };
 
 beforeAll(() => setLanguage("en"));
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** A stream that sends messages at these times, in milliseconds from its start, and stays open. */
 function streaming(said: readonly (readonly [atMs: number, update: Update])[]) {

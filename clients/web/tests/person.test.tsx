@@ -4,7 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { recordApi, tournamentApi } from "../src/api/client";
 import { tableOf } from "../src/attend/words";
 import { ListRecordsResponseSchema, RecordSummarySchema } from "../src/gen/chefshat/v1/record_service_pb";
@@ -20,8 +20,6 @@ import { stateOf } from "./table-state";
 
 const NAME = '<b>Dr. "Rösa"/II</b> & ?#%';
 const PER_PAGE = 50;
-
-afterEach(() => vi.restoreAllMocks());
 
 const line = (name: string, kind = ParticipantKind.HUMAN, nameFingerprint = "") =>
   create(RatedSchema, { name, kind, nameFingerprint, place: 3, rating: { mean: 30, deviation: 2.5, games: 12 } });

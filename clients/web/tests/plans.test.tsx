@@ -4,7 +4,7 @@
 import { signal } from "@preact/signals";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import type { Acting } from "../src/table/acting";
 import { passDelayMs, useAutoPass } from "../src/table/auto-pass";
@@ -24,7 +24,6 @@ const PASS: Move = { kind: "pass" };
 const action = (move: Move) => actionOf(move, FACES);
 
 beforeEach(() => vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] }));
-afterEach(() => vi.useRealTimers());
 
 /** Others decide while 9s lie on the board. */
 function table(changed: Partial<TableState> = {}): TableState {

@@ -4,7 +4,7 @@
 import { Code } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { type Polled, usePolled } from "../src/api/poll";
 import { AWAY, tooMany } from "./refusals";
 
@@ -15,12 +15,6 @@ let seen: Polled<number> | undefined;
 beforeEach(() => {
   vi.useFakeTimers();
   root = document.createElement("div");
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
 });
 
 async function shown(ask: (signal: AbortSignal) => Promise<number>, key = "one") {

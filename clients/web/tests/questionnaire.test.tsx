@@ -4,7 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
 import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { StudyShownQuestionnaireSchema } from "../src/gen/chefshat/v1/study_pb";
 import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatted";
 import { WithPictures } from "../src/studies/Pictures";
@@ -16,9 +16,6 @@ import { AWAY, refused } from "./refusals";
 const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
 const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
 const GAMES = { case: "choice" as const, value: { options: ["cards", "chess"], multiple: true } };
-
-afterEach(() => act(() => render(null, root)));
-afterEach(() => void vi.useRealTimers());
 
 const show = (what: ComponentChild) => act(() => render(what, root));
 const shownItems = () => [...root.querySelectorAll<HTMLElement>("[data-item]")].map(({ dataset }) => dataset.item);

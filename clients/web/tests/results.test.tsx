@@ -3,7 +3,7 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { tournamentApi } from "../src/api/client";
 import {
   TournamentFormat,
@@ -15,7 +15,6 @@ import {
 import { ListTournamentGamesResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { dateOf, setLanguage } from "../src/i18n";
 import { fileName } from "../src/parts/download";
-import { forgetAll } from "../src/store";
 import { certificatesOf } from "../src/tournaments/certificate";
 import { Results } from "../src/tournaments/ResultsPage";
 import { eventually, root } from "./mounted";
@@ -67,10 +66,6 @@ beforeEach(() => {
   vi.spyOn(tournamentApi, "listTournamentGames").mockResolvedValue(
     create(ListTournamentGamesResponseSchema, { games }),
   );
-});
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 test("the page has standings, date, settings and the games that count", async () => {

@@ -22,8 +22,6 @@ afterEach(() => {
     Reflect.deleteProperty(document, name);
   Reflect.deleteProperty(document.documentElement, "requestFullscreen");
   vi.clearAllMocks();
-  vi.restoreAllMocks();
-  vi.useRealTimers();
 });
 
 async function show(fullscreenEnabled: boolean, fullscreenElement: Element | null) {
@@ -102,7 +100,5 @@ test("a language that cannot be loaded is reported", async () => {
     );
   } finally {
     vi.doUnmock("../src/i18n/it");
-    vi.unstubAllGlobals();
-    localStorage.clear();
   }
 });

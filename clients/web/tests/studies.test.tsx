@@ -60,14 +60,7 @@ const items: StudyShownItem[] = ITEMS.map((item) => create(StudyShownItemSchema,
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
 });
-afterEach(async () => {
-  // Leaving the page stops its stream.
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-  await setLanguage("en");
-  localStorage.clear();
-});
+afterEach(() => setLanguage("en"));
 
 const show = (beside?: JSX.Element) =>
   act(async () => {

@@ -4,7 +4,7 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, type MockInstance, test, vi } from "vitest";
+import { beforeEach, expect, type MockInstance, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
 import { AnswerStatus, DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import {
@@ -77,11 +77,6 @@ beforeEach(() => {
   acted = vi
     .spyOn(playApi, "act")
     .mockResolvedValue(create(ActResponseSchema, { result: { decisionId: 7n, status: AnswerStatus.ACCEPTED } }));
-});
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
 });
 
 /** A participant's game, with its decision open. Returns what the page sends to the study. */

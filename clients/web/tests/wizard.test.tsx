@@ -4,13 +4,12 @@
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
-import { beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { DecisionKind, ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
 import { HintSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { newForm, requestOf } from "../src/lobby/room-form";
-import { forgetAll } from "../src/store";
 import type { GivenHint } from "../src/table/acting";
 import { type Gesture, lineGesture, MAX_LINE, phraseOf, shownLabel } from "../src/table/expressions";
 import { actionOf } from "../src/table/model/actions";
@@ -26,8 +25,6 @@ import { DEALT, stateOf } from "./table-state";
 const FACES = 11;
 const PASS = actionOf({ kind: "pass" }, FACES);
 const NINES = actionOf({ kind: "play", face: 9, quantity: 2, jokers: 0 }, FACES);
-
-beforeEach(() => forgetAll());
 
 function decisionAt(receivedAtMs: number): OpenDecision {
   return {

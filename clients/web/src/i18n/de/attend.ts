@@ -1,7 +1,7 @@
 // German texts of attend/: the attendant of a table with real cards.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 

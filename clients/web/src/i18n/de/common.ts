@@ -2,8 +2,8 @@
 // game. The same word stands for the same thing in all parts: face "Wert", board "Brett", hand
 // "Blatt", play "spielen", pass "passen", declare "ansagen", exchange "Tausch", game "Partie".
 
-import type { Texts } from "../texts";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 

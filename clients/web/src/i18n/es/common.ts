@@ -3,8 +3,8 @@
 // "mano", play "jugar", "jugada", pass "pasar", declare "declarar", exchange "intercambio", game
 // "partida".
 
-import type { Texts } from "../texts";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 

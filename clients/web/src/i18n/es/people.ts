@@ -1,7 +1,7 @@
 // Spanish texts of people/.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 

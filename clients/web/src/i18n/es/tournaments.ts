@@ -1,7 +1,7 @@
 // Spanish texts of tournaments/.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("es");

@@ -1,7 +1,7 @@
 // Italian texts of attend/: chi assiste a un tavolo con carte vere.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 

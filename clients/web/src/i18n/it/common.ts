@@ -1,8 +1,8 @@
 // Italian texts that several parts of the page use: the frame, kinds of participants, words of the
 // game.
 
-import type { Texts } from "../texts";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 

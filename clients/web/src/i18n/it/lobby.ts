@@ -1,7 +1,7 @@
 // Italian texts of lobby/.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("it");

@@ -1,7 +1,7 @@
 // Italian texts of creating and running a tournament, in tournaments/.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 

@@ -1,7 +1,7 @@
 // Italian texts of studies, in studies/.
 
-import type { Texts } from "../texts";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 

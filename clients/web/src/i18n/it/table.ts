@@ -2,8 +2,8 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import type { Texts } from "../texts";
 import { numerals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 const number = numerals(
