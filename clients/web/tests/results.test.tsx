@@ -80,6 +80,17 @@ test("the page has standings, date, settings and the games that count", async ()
 });
 
 test.each([
+  [TournamentState.PLAYING, "Standings"],
+  [TournamentState.FINISHED, "Final standings"],
+  // It was closed early: nobody has won.
+  [TournamentState.CLOSED, "Standings"],
+])("in state %i the standings and their table are called %j", async (state, title) => {
+  await act(async () => render(<Results live={{ tournament: tournament(state), standings, games: [] }} />, root));
+  const titles = [...root.querySelectorAll('section:has([data-part~="standings"]) > h2, caption')];
+  expect(titles.slice(0, 2).map(({ textContent }) => textContent)).toEqual([title, title]);
+});
+
+test.each([
   ["en", "took 1st place of 5 in the tournament", "took part in the tournament", "first in 2 games"],
   ["de", "hat im Turnier den 1. Platz von 5 erreicht", "hat am Turnier teilgenommen", "2 gewonnene Partien"],
   ["es", "obtuvo el 1.º puesto de 5 en el torneo", "participó en el torneo", "2 partidas ganadas"],

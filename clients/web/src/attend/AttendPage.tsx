@@ -87,7 +87,7 @@ function AttendantLink({ address }: { address: string }) {
     <div class={css.linkBody}>
       <div class="stack">
         <p>{words.text}</p>
-        <CopyLine label={words.address} text={address} />
+        <CopyLine label={t().lobby.invite.link} text={address} />
       </div>
       <QrCode text={address} label={words.qr} />
       <ThisMachine />

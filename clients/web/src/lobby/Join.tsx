@@ -51,7 +51,7 @@ function WayIn({ code }: { code: string }) {
     return (
       <>
         <p>
-          {words.codeIs} <span class={css.code}>{code}</span>
+          {words.code} <span class={css.code}>{code}</span>
         </p>
         <Notice kind="fault">{wordsOf(fault)}</Notice>
         <JoinForm />
@@ -147,7 +147,7 @@ export function NameForm({ code, room }: NameFormProps) {
   return (
     <form class={css.form} onSubmit={join}>
       <p>
-        {words.codeIs} <span class={css.code}>{code}</span>
+        {words.code} <span class={css.code}>{code}</span>
       </p>
       <TextField
         label={words.name}

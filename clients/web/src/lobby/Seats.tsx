@@ -33,7 +33,7 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
               {participant.atTable ? (
                 <span class="soft small">{t().table.physical.atTable}</span>
               ) : (
-                !participant.connected && <span class={css.away}>{words.away}</span>
+                !participant.connected && <span class={css.away}>{t().table.presence.away}</span>
               )}
             </>
           )}

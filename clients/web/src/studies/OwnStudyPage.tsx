@@ -149,7 +149,7 @@ function Owned({ studyId, unlock }: { studyId: string; unlock: ComponentChild })
   }
   return (
     <>
-      {link === "lost" && <Notice kind="fault">{t().studies.lost}</Notice>}
+      {link === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
       {live && followed ? (
         <OwnStudy {...live} onChanged={(participant) => followed.merge(undefined, [participant])} />
       ) : (

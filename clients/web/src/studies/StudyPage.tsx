@@ -102,13 +102,13 @@ export function Taking({ part }: { part: Participating }) {
     return (
       <section class={`sheet ${css.stage}`}>
         <h1>{words.title}</h1>
-        {part.link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : <p>{t().common.loading}</p>}
+        {part.link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : <p>{t().common.loading}</p>}
       </section>
     );
   }
   return (
     <div class={css.study} data-part="study">
-      {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
+      {part.link.value === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
       <Progress view={view} />
       {view.test && <TestNotice key={stageKey(view)} view={view} part={part} />}
       <WithPictures load={part.picture}>

@@ -72,9 +72,12 @@ export function ManageParticipants({ tournament, agents }: { tournament: Tournam
           <li key={participant}>
             <div>
               <b>{nameOf(tournament, participant)}</b>
-              {withdrawn && <span class="soft small"> {words.withdrawn}</span>}
+              {withdrawn && <span class="soft small"> {t().tournaments.standings.withdrawn}</span>}
               {former.length > 0 && (
-                <span class="soft small"> {words.former(former.map(({ name }) => name).join(", "))}</span>
+                <span class="soft small">
+                  {" "}
+                  {t().tournaments.standings.former(former.map(({ name }) => name).join(", "))}
+                </span>
               )}
             </div>
             <details class={css.change}>
@@ -108,7 +111,7 @@ function PlaceLink({ tournament: { tournamentId }, held, renew }: PlaceLinkProps
   return (
     <Notice kind="good">
       {words.linkFor(held.name)}
-      <CopyLine label={words.link} text={linkToPlace(tournamentId, held)} />
+      <CopyLine label={t().lobby.moving.link} text={linkToPlace(tournamentId, held)} />
       <Button look="quiet" onClick={dismiss}>
         {words.linkSent}
         <span class="visually-hidden"> ({held.name})</span>

@@ -49,13 +49,13 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
         fault={tried && code.trim() === "" ? words.codeMissing : undefined}
       />
       <TextField
-        label={words.name}
+        label={t().lobby.join.name}
         hint={words.nameHint}
         value={name}
         onText={setName}
         maxLength={MAX_NAME}
         autoComplete="nickname"
-        fault={tried && name.trim() === "" ? words.nameMissing : undefined}
+        fault={tried && name.trim() === "" ? t().lobby.join.nameMissing : undefined}
       />
       {fault && <Notice kind="fault">{fault}</Notice>}
       <Button look="main" type="submit" busy={busy}>

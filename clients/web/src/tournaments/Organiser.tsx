@@ -44,7 +44,7 @@ export function Organiser({ live }: { live: LiveTournament }) {
           title={words.invite}
           code={hosted.joinCode}
           address={address}
-          agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
+          agent={isForAgents(tournament) ? { label: t().lobby.invite.agent, command } : undefined}
         />
       )}
       {state === TournamentState.PLAYING && <Pause tournament={tournament} />}

@@ -134,7 +134,7 @@ function Banner({ part }: { part: Part }) {
       </Notice>
     );
   }
-  return link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : null;
+  return link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : null;
 }
 
 /** During a game: takes the seat back from a substitute. */

@@ -47,7 +47,7 @@ function PhysicalGame({ tournament, game }: { tournament: Tournament; game: Tour
       </p>
       {fault && <Notice kind="fault">{fault}</Notice>}
       <Button look="main" busy={busy} onClick={() => run(open)}>
-        {t().attend.room.attend}
+        {t().attend.title}
       </Button>
     </>
   );

@@ -74,9 +74,9 @@ export function TutorialPage() {
       decision={decision}
       untimed
       refusal={words.notThis}
-      caption={words.title}
+      caption={t().common.nav.tutorial}
       banner={
-        <section class={css.lesson} data-part="lesson" aria-label={words.title}>
+        <section class={css.lesson} data-part="lesson" aria-label={t().common.nav.tutorial}>
           <Shows what="lesson" />
           <p class={`${css.count} number`}>{words.step(at + 1, LESSONS.length)}</p>
           <p class={css.words}>{ready ? text : words.watch}</p>
@@ -89,7 +89,7 @@ export function TutorialPage() {
             <>
               <PlayNow />
               <ButtonLink look="quiet" href="/">
-                {words.toLobby}
+                {t().common.toLobby}
               </ButtonLink>
             </>
           )}

@@ -45,7 +45,6 @@ export const attend: Texts["attend"] = {
   },
   violation: {
     label: "Nicht erlaubt",
-    of: (name, text) => (name ? `${name}: ${text}` : text),
     todo: "Es zählt nicht. Lass die Karten zurücknehmen oder berichtige, was falsch gelesen wurde.",
     takenBack: "Zurückgenommen",
     reenter: "Eingeben, was wirklich dort liegt",
@@ -91,7 +90,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Wer",
     face: "Wert",
-    jokerAlone: "ein einzelner Joker",
     number: "Wie viele",
     jokers: "Joker dazu",
     fewer: (what) => `Weniger: ${what}`,
@@ -104,7 +102,6 @@ export const attend: Texts["attend"] = {
     passes: (name) => `${name} passt`,
     passWithdrawn: (name) => `${name} nimmt das Passen zurück`,
     clearedText: "Die Pizza ist fertig, und die Karten wurden vom Brett genommen.",
-    cleared: "Das Brett wurde geleert",
     declares: (name) => `${name} sagt an`,
     nobodyDeclares: "Niemand sagt an",
     giftUnseen: (name) => `${name} hat gegeben, Karten nicht gesehen`,
@@ -166,8 +163,6 @@ export const attend: Texts["attend"] = {
       }),
   },
   seats: {
-    title: "Sitzplätze",
-    atTable: "am Tisch",
     remote: "online",
     handKnown: "Blatt bekannt",
     handUnknown: "Blatt nicht bekannt",
@@ -178,12 +173,9 @@ export const attend: Texts["attend"] = {
   link: {
     title: "Auf einem Tablet neben dem Tisch",
     text: "Wer diese Adresse hat, kann für den Tisch melden. Zeige sie nur denen, die ihn betreuen.",
-    address: "Adresse",
     qr: "QR-Code der Ansicht für die Tischbetreuung",
   },
   room: {
-    attend: "Den Tisch betreuen",
-    replay: "Replay",
     realCards: "echte Karten",
   },
 };

@@ -40,7 +40,6 @@ export const attend = {
   },
   violation: {
     label: "Not allowed",
-    of: (name: string, text: string) => (name ? `${name}: ${text}` : text),
     todo: "It does not count. Have the cards taken back, or correct what was misread.",
     takenBack: "Taken back",
     reenter: "Enter what really lies there",
@@ -77,7 +76,6 @@ export const attend = {
     },
     seat: "Who",
     face: "Face",
-    jokerAlone: "a joker alone",
     number: "How many",
     jokers: "Jokers with them",
     fewer: (what: string) => `Fewer: ${what}`,
@@ -90,7 +88,6 @@ export const attend = {
     passes: (name: string) => `${name} passes`,
     passWithdrawn: (name: string) => `${name} takes the pass back`,
     clearedText: "The pizza is done and the cards were taken off the board.",
-    cleared: "The board was cleared",
     declares: (name: string) => `${name} declares`,
     nobodyDeclares: "Nobody declares",
     giftUnseen: (name: string) => `${name} gave, cards not seen`,
@@ -152,8 +149,6 @@ export const attend = {
       }),
   },
   seats: {
-    title: "Seats",
-    atTable: "at the table",
     remote: "remote",
     handKnown: "hand known",
     handUnknown: "hand not known",
@@ -164,12 +159,9 @@ export const attend = {
   link: {
     title: "On a tablet beside the table",
     text: "Anyone with this address can report about the table. Show it only to those who attend to it.",
-    address: "Address",
     qr: "QR code of the attendant’s view",
   },
   room: {
-    attend: "Attend to the table",
-    replay: "Replay",
     realCards: "real cards",
   },
 };

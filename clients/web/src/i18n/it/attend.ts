@@ -45,7 +45,6 @@ export const attend: Texts["attend"] = {
   },
   violation: {
     label: "Non permesso",
-    of: (name, text) => (name ? `${name}: ${text}` : text),
     todo: "Non conta. Fai riprendere le carte, o correggi ciò che è stato letto male.",
     takenBack: "Carte riprese",
     reenter: "Inserisci che cosa c’è davvero",
@@ -91,7 +90,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Chi",
     face: "Valore",
-    jokerAlone: "un jolly da solo",
     number: "Quante",
     jokers: "Jolly insieme",
     fewer: (what) => `Meno: ${what}`,
@@ -104,7 +102,6 @@ export const attend: Texts["attend"] = {
     passes: (name) => `${name} passa`,
     passWithdrawn: (name) => `${name} ritira il passo`,
     clearedText: "La pizza è finita e le carte sono state tolte dal piatto.",
-    cleared: "Il piatto è stato svuotato",
     declares: (name) => `${name} dichiara`,
     nobodyDeclares: "Nessuno dichiara",
     giftUnseen: (name) => `${name} ha dato, carte non viste`,
@@ -166,8 +163,6 @@ export const attend: Texts["attend"] = {
       }),
   },
   seats: {
-    title: "Posti",
-    atTable: "al tavolo",
     remote: "a distanza",
     handKnown: "mano nota",
     handUnknown: "mano non nota",
@@ -178,12 +173,9 @@ export const attend: Texts["attend"] = {
   link: {
     title: "Su un tablet accanto al tavolo",
     text: "Chi ha questo indirizzo può fare segnalazioni sul tavolo. Mostralo solo a chi assiste.",
-    address: "Indirizzo",
     qr: "Codice QR della vista di chi assiste",
   },
   room: {
-    attend: "Assisti al tavolo",
-    replay: "Replay",
     realCards: "carte vere",
   },
 };

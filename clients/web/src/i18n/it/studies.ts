@@ -8,7 +8,6 @@ const plural = plurals("it");
 export const studies: Texts["studies"] = {
   title: "Studio",
   next: "Continua",
-  lost: "Connessione persa. Riconnessione…",
   progress: (step, steps) => `Passo ${step} di ${steps}`,
   elsewhere: {
     title: "Lei continua su un altro dispositivo o un’altra pagina",
@@ -23,8 +22,6 @@ export const studies: Texts["studies"] = {
     there: "Apra lì questo link. Qui non è cominciato né cambiato nulla.",
     wider:
       "Allarghi la finestra, giri il dispositivo o apra questo link su uno più grande. Qui non è cominciato né cambiato nulla.",
-    link: "Link",
-    qr: "Codice QR del link",
     retry: "Riprovare",
   },
   consent: {
