@@ -4,6 +4,7 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { agentsFor, useOffered } from "../api/server";
 import type { StudySettings } from "../gen/chefshat/v1/study_pb";
 import { language, languages, t } from "../i18n";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
@@ -282,12 +283,7 @@ function FromForm() {
       {(unfinished.length > 0 || Object.keys(faults).length > 0) && (
         <Notice kind="fault">{t().lobby.make.lookAgain}</Notice>
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button type="submit" look="main" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
     </form>
   );
 }

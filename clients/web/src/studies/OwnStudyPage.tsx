@@ -10,7 +10,6 @@ import {
   type Study,
   type StudyLink,
   type StudyParticipant,
-  StudyParticipantState,
   StudyPointer,
   type StudyRequiredDevice,
 } from "../gen/chefshat/v1/study_pb";
@@ -18,34 +17,21 @@ import { hex } from "../hex";
 import { momentOf, t } from "../i18n";
 import { CopyLine, QrCode } from "../lobby/Invite";
 import { MAX_NAME } from "../lobby/room-form";
+import { ActionButton, Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { download, fileName } from "../parts/download";
 import { CheckField, Field, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import { zipped } from "../parts/zip";
 import { navigateFromHere, type PageProps } from "../router";
 import { byCondition, stateName, statesOf } from "./board";
 import { studyApi } from "./client";
 import { LinkList } from "./LinkList";
 import css from "./Own.module.css";
-import {
-  addParticipants,
-  addressOf,
-  addTestParticipants,
-  closeStudy,
-  deleteDataOf,
-  deleteStudy,
-  exportStudy,
-  keepOwnerToken,
-  linksOf,
-  mayOwn,
-  ownership,
-  ownerTokenOf,
-  removeFromStudy,
-  settingsOfStudy,
-} from "./owning";
+import { addressOf, deleteStudy, exportStudy, keepOwnerToken, mayOwn, ownership, ownerTokenOf } from "./owning";
 import { MAX_ADDED, participantsIn } from "./participants";
 import { fileOf } from "./settings-file";
 
@@ -99,11 +85,11 @@ interface StudyFollowing {
   readonly following: Following;
   /** Takes over what is known of participants. */
   merge(study: Study | undefined, participants: readonly StudyParticipant[]): void;
+  stop(): void;
 }
 
 function useStudy(studyId: string): StudyFollowing | undefined {
-  const [followed, setFollowed] = useState<StudyFollowing>();
-  useEffect(() => {
+  const start = () => {
     const live = signal<FollowedStudy | undefined>(undefined);
     const merge = (study: Study | undefined, participants: readonly StudyParticipant[]) => {
       const now = live.peek();
@@ -127,10 +113,9 @@ function useStudy(studyId: string): StudyFollowing | undefined {
       },
       { isComplete: isOver, restsWhileHidden: true },
     );
-    setFollowed({ live, following, merge });
-    return () => following.stop();
-  }, [studyId]);
-  return followed;
+    return { live, following, merge, stop: following.stop };
+  };
+  return useStarted(start, studyId);
 }
 
 /** The study, or `unlock` to enter another key if this device's is not that of a study of the server. */
@@ -169,6 +154,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
   const words = t().studies.own;
   const { studyId, settings, closed } = study;
   const deletesAtMs = settings?.deletesAtMs ?? 0n;
+  const close = () => studyApi.closeStudy(ownership(studyId)).then(() => false);
   return (
     <div class={css.page} data-part="own-study">
       <header class={css.head}>
@@ -196,7 +182,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
       </details>
       <SettingsFile studyId={studyId} />
       {!closed && (
-        <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeStudy(studyId).then(() => false)}>
+        <ConfirmButton label={words.close} confirm={words.closeDo} act={close}>
           {words.closeText}
         </ConfirmButton>
       )}
@@ -215,18 +201,15 @@ function deviceWords({ pointer, minWidth }: StudyRequiredDevice): string {
 
 /** The settings as a file; only a call for them has the pictures. */
 function SettingsFile({ studyId }: { studyId: string }) {
-  const { busy, fault, run } = useAttempt();
   const save = async () => {
-    const settings = await settingsOfStudy(studyId);
+    const settings = (await studyApi.getStudy(ownership(studyId))).study?.settings;
     if (settings) download(fileOf(settings), `${fileName(settings.name)}.json`, "application/json");
-    return false;
   };
   return (
     <div class={css.export}>
-      <Button look="quiet" busy={busy} onClick={() => run(save)}>
+      <ActionButton look="quiet" again act={save}>
         {t().studies.own.settings}
-      </Button>
-      {fault && <Notice kind="fault">{fault}</Notice>}
+      </ActionButton>
     </div>
   );
 }
@@ -344,7 +327,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
     setUnsure(false);
     run(async () => {
       try {
-        await addParticipants(studyId, number, pseudonyms, together);
+        await studyApi.addStudyParticipants({ ...ownership(studyId), count: number, pseudonyms, together });
       } catch (thrown) {
         // The answer was lost. Repeated, the request would add others.
         setUnsure(faultOf(thrown).reason === "");
@@ -376,13 +359,10 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
           fault={wrongGroups ? words.wholeGroups(size) : undefined}
         />
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
       {unsure && <Notice kind="hint">{words.unsure}</Notice>}
-      <div>
-        <Button type="submit" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit look="plain" {...{ busy, fault }}>
+        {words.submit}
+      </Submit>
     </form>
   );
 }
@@ -397,7 +377,8 @@ function Tests({ study }: { study: Study }) {
   const valid = Number.isInteger(number) && number >= 1 && number <= MAX_ADDED;
   const add = (event: Event) => {
     event.preventDefault();
-    if (valid) run(() => addTestParticipants(studyId, number).then(() => false));
+    const request = { ...ownership(studyId), count: number, test: true };
+    if (valid) run(() => studyApi.addStudyParticipants(request).then(() => false));
   };
   if (closed && testParticipants === 0) return null;
   return (
@@ -413,12 +394,9 @@ function Tests({ study }: { study: Study }) {
             inputMode="numeric"
             fault={valid ? undefined : t().studies.make.problems.number(1, MAX_ADDED)}
           />
-          {fault && <Notice kind="fault">{fault}</Notice>}
-          <div>
-            <Button type="submit" busy={busy}>
-              {words.submit}
-            </Button>
-          </div>
+          <Submit look="plain" {...{ busy, fault }}>
+            {words.submit}
+          </Submit>
         </form>
       )}
       {testParticipants > 0 && (
@@ -443,7 +421,7 @@ function useLinks({ studyId, known }: LinksProps, isWanted: (link: StudyLink) =>
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
-      setLinks((await linksOf(studyId)).filter(isWanted));
+      setLinks((await studyApi.listStudyLinks(ownership(studyId))).links.filter(isWanted));
       return false;
     });
   useEffect(() => {
@@ -537,15 +515,6 @@ function Participants({ study, participants, onChanged }: OwnStudyProps) {
   );
 }
 
-const LEFT = [
-  StudyParticipantState.WITHDRAWN,
-  StudyParticipantState.DROPPED_OUT,
-  StudyParticipantState.REMOVED,
-  StudyParticipantState.SCREENED_OUT,
-  StudyParticipantState.LEFT_OVER,
-  StudyParticipantState.COMPLETED,
-];
-
 interface RowProps extends Pick<OwnStudyProps, "study" | "onChanged"> {
   participant: StudyParticipant;
 }
@@ -554,10 +523,12 @@ function Row({ study, participant, onChanged }: RowProps) {
   const words = t().studies.own;
   const { number, pseudonym, panelId, state, step, sessions, connected, conditions, group, dataDeleted } = participant;
   const name = pseudonym || `${words.board.number} ${number}`;
-  const over = LEFT.includes(state);
+  const over = !["invited", "active"].includes(stateName(state));
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
-  const act = async (call: Promise<StudyParticipant | undefined>) => {
-    const changed = await call;
+  const request = { ...ownership(study.studyId), number };
+  /** The participant of the answer is as it is then. */
+  const act = async (call: Promise<{ participant?: StudyParticipant }>) => {
+    const changed = (await call).participant;
     if (changed) onChanged(changed);
     return false;
   };
@@ -596,7 +567,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                     label={words.remove}
                     confirm={words.removeDo}
                     subject={name}
-                    act={() => act(removeFromStudy(study.studyId, number, false))}
+                    act={() => act(studyApi.removeStudyParticipant(request))}
                   >
                     {words.removeText(name)}
                   </ConfirmButton>
@@ -604,7 +575,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                     label={words.replace}
                     confirm={words.replaceDo}
                     subject={name}
-                    act={() => act(removeFromStudy(study.studyId, number, true))}
+                    act={() => act(studyApi.removeStudyParticipant({ ...request, replace: true }))}
                   >
                     {words.replaceText(name)}
                   </ConfirmButton>
@@ -614,7 +585,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                 label={words.deleteData}
                 confirm={words.deleteDo}
                 subject={name}
-                act={() => act(deleteDataOf(study.studyId, number))}
+                act={() => act(studyApi.deleteStudyParticipant(request))}
               >
                 {words.deleteText(name)}
               </ConfirmButton>

@@ -16,6 +16,7 @@ import {
 } from "../gen/chefshat/v1/study_pb";
 import { leaveOut } from "../hiding";
 import { dateOf, showLanguage, t } from "../i18n";
+import { ActionButton, Submit } from "../parts/ActionButton";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
@@ -24,6 +25,7 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { download } from "../parts/download";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import { useTabMark } from "../parts/tab";
 import type { PageProps } from "../router";
 import { Formatted } from "./Formatted";
@@ -41,12 +43,7 @@ const DELETION_TAKES_MS = 7_200_000n;
 
 /** The page. */
 export function StudyPage({ route }: PageProps<"study">) {
-  const [part, setPart] = useState<Participating | undefined>(undefined);
-  useEffect(() => {
-    const started = startParticipating(route.link);
-    setPart(started);
-    return () => started.stop();
-  }, [route.link]);
+  const part = useStarted(() => startParticipating(route.link), route.link);
   // Other pages of the server are not part of the study.
   useLayoutEffect(() => leaveOut(["pages"]), []);
   return part ? <Taking part={part} /> : null;
@@ -265,12 +262,7 @@ function Consent({ consent, view, part }: StageProps & { consent: StudyConsent }
         onCheck={setAgreed}
         fault={tried && !agreed ? words.must : undefined}
       />
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button type="submit" look="main" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
       <ConfirmButton label={words.decline} confirm={words.declineDo} act={() => part.withdraw(true).then(() => false)}>
         {words.declineText}
       </ConfirmButton>
@@ -354,16 +346,12 @@ function External({ external, part }: { external: StudyExternalQuestionnaire; pa
 }
 
 function Next({ part, children }: { part: Participating; children: ComponentChildren }) {
-  const { busy, fault, run } = useAttempt();
   return (
-    <>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button look="main" busy={busy} onClick={() => run(() => part.proceed().then(() => false))}>
-          {children}
-        </Button>
-      </div>
-    </>
+    <div>
+      <ActionButton again act={part.proceed}>
+        {children}
+      </ActionButton>
+    </div>
   );
 }
 

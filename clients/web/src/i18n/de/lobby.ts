@@ -141,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Eine Person am Tisch",
       atTableRobot: "Ein Roboter am Tisch",
-      remoteHuman: "Online: frei für eine Person",
-      remoteAnybody: "Online: frei für alle",
-      remoteAgent: "Online: frei für einen Agenten",
-      remoteRobot: "Online: frei für einen Roboter",
-      remoteModel: "Online: frei für ein Sprachmodell",
+      remote: (free) => `Online: ${free}`,
       human: "Frei für eine Person",
       anybody: "Frei für alle",
       agent: "Frei für einen Agenten",

@@ -140,11 +140,7 @@ export const lobby = {
     choices: {
       atTableHuman: "A person at the table",
       atTableRobot: "A robot at the table",
-      remoteHuman: "Remote: free for a person",
-      remoteAnybody: "Remote: free for anyone",
-      remoteAgent: "Remote: free for an agent",
-      remoteRobot: "Remote: free for a robot",
-      remoteModel: "Remote: free for a language model",
+      remote: (free: string) => `Remote: ${free}`,
       human: "Free for a person",
       anybody: "Free for anyone",
       agent: "Free for an agent",

@@ -141,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Una persona en la mesa",
       atTableRobot: "Un robot en la mesa",
-      remoteHuman: "A distancia: libre para una persona",
-      remoteAnybody: "A distancia: libre para cualquiera",
-      remoteAgent: "A distancia: libre para un agente",
-      remoteRobot: "A distancia: libre para un robot",
-      remoteModel: "A distancia: libre para un modelo de lenguaje",
+      remote: (free) => `A distancia: ${free}`,
       human: "Libre para una persona",
       anybody: "Libre para cualquiera",
       agent: "Libre para un agente",

@@ -141,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Una persona al tavolo",
       atTableRobot: "Un robot al tavolo",
-      remoteHuman: "A distanza: libero per una persona",
-      remoteAnybody: "A distanza: libero per chiunque",
-      remoteAgent: "A distanza: libero per un agente",
-      remoteRobot: "A distanza: libero per un robot",
-      remoteModel: "A distanza: libero per un modello linguistico",
+      remote: (free) => `A distanza: ${free}`,
       human: "Libero per una persona",
       anybody: "Libero per chiunque",
       agent: "Libero per un agente",
