@@ -166,6 +166,8 @@ function TestNotice({ view: { content }, part }: StageProps) {
   const words = t().studies.test;
   const { busy, fault, run } = useAttempt();
   const game = content.case === "game" && !content.value.ended ? content.value : undefined;
+  const waits = content.case === "arrival" || (game && game.waitsFor > 0);
+  const label = content.case === "questionnaire" ? words.skip : waits ? words.alone : game?.ticket && words.end;
   // The end of a game is shown a moment later.
   const [gone, setGone] = useState(false);
   const goOn = () =>
@@ -179,19 +181,9 @@ function TestNotice({ view: { content }, part }: StageProps) {
       <p>
         <b>{words.title}</b> {words.text}
       </p>
-      {!gone && content.case === "questionnaire" && (
+      {!gone && label && (
         <Button busy={busy} onClick={goOn}>
-          {words.skip}
-        </Button>
-      )}
-      {!gone && (content.case === "arrival" || (game && game.waitsFor > 0)) && (
-        <Button busy={busy} onClick={goOn}>
-          {words.alone}
-        </Button>
-      )}
-      {!gone && game?.ticket && (
-        <Button busy={busy} onClick={goOn}>
-          {words.end}
+          {label}
         </Button>
       )}
       {fault && <p>{fault}</p>}

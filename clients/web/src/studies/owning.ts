@@ -3,13 +3,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { isSecret } from "../api/secrets";
-import type {
-  Study,
-  StudyLink,
-  StudyParticipant,
-  StudySettings,
-  StudySettingsSchema,
-} from "../gen/chefshat/v1/study_pb";
+import type { Study, StudyLink, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { pathOf } from "../router";
 import { recallObject, remember, remembered } from "../store";
 import { studyApi } from "./client";
