@@ -106,7 +106,7 @@ function Lines({ rated }: { rated: readonly Rated[] }) {
   const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
-      <table class={css.leaderboard}>
+      <table class={`listing ${css.leaderboard}`}>
         <caption class="soft small">{t().people.order}</caption>
         <thead>
           <tr>

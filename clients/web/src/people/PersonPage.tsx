@@ -137,7 +137,7 @@ function NotRated({ record, seat }: Pick<OwnGame, "record" | "seat">) {
 function Games({ games }: { games: readonly OwnGame[] }) {
   const words = t().people.person;
   return (
-    <table class={css.personGames}>
+    <table class={`listing ${css.personGames}`}>
       <thead>
         <tr>
           <th scope="col">{words.columns.date}</th>

@@ -251,7 +251,7 @@ function Counts({ study, participants }: FollowedStudy) {
       <h2>{words.board.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a region that scrolls must be reachable with the keyboard */}
       <section class={css.scroll} tabIndex={0} aria-label={words.board.title}>
-        <table class={css.table} data-part="conditions">
+        <table class={`listing ${css.table}`} data-part="conditions">
           <thead>
             <tr>
               <th scope="col">{words.board.condition}</th>
@@ -489,7 +489,7 @@ function Participants({ study, participants, onChanged }: OwnStudyProps) {
     <section class={`sheet ${css.part}`}>
       <h2>{words.participants}</h2>
       <section class={css.scroll} aria-label={words.participants}>
-        <table class={css.table} data-part="participants">
+        <table class={`listing ${css.table}`} data-part="participants">
           <thead>
             <tr>
               {[words.number, words.pseudonym, words.conditions, words.stateColumn, words.stage, words.seen].map(

@@ -40,7 +40,7 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   const players = tournament.settings?.rules?.players ?? 4;
   return (
-    <table class={css.standings} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
+    <table class={`listing ${css.standings}`} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
       <caption class="visually-hidden">{standingsTitle(tournament)}</caption>
       <thead>
         <tr>
