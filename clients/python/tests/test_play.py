@@ -3,31 +3,14 @@
 import asyncio
 import math
 import threading
-from collections.abc import Callable, Mapping
 
 import pytest
 from fake_game import QUESTIONS, FakeGame, FakeSeat
 from fake_server import FakeServer
+from playing import QUICK, Player, play_asyncio, play_blocking
 
 import chefshat
-from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, backoff, pb
-
-QUICK = Backoff(first_s=0.001, max_s=0.01)
-Results = dict[str, SeatResult]
-Player = Callable[[str, Mapping[str, Agent]], Results]
-
-
-def play_blocking(address: str, agents: Mapping[str, Agent]) -> Results:
-    with chefshat.Client(address, backoff=QUICK) as client:
-        return client.play_many(agents)
-
-
-def play_asyncio(address: str, agents: Mapping[str, Agent]) -> Results:
-    async def run() -> Results:
-        async with aio.Client(address, backoff=QUICK) as client:
-            return await client.play_many(agents)
-
-    return asyncio.run(run())
+from chefshat import Agent, ChefsHatError, Decision, RandomAgent, SeatResult, aio, backoff, pb
 
 
 @pytest.fixture(params=[play_blocking, play_asyncio], ids=["blocking", "asyncio"])
