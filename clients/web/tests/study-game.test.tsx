@@ -2,7 +2,6 @@
 // decision time measured on the participant's device, which is sent with every answer.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { beforeEach, expect, type MockInstance, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
@@ -16,7 +15,7 @@ import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
 import { StudyPage } from "../src/studies/StudyPage";
 import { actionOf, maskOf } from "../src/table/model/actions";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { fakeStudy } from "./study-fake";
 import { DEALT, SEATS } from "./table-state";
 
@@ -83,7 +82,7 @@ beforeEach(() => {
 async function play(traces: boolean) {
   const game = { game: 1, games: 1, roomId: "r1", gameId: GAME, ticket: "ef".repeat(48) };
   const { sent } = fakeStudy([{ case: "game", value: game }], { traces });
-  await act(() => render(<StudyPage route={{ page: "study", link: "Xk3_abcdefghijklmnopqrstuvwxy1" }} />, root));
+  await mount(<StudyPage route={{ page: "study", link: "Xk3_abcdefghijklmnopqrstuvwxy1" }} />);
   await pass(0);
   expect(root.querySelector("[data-decision]")).not.toBeNull();
   return sent;
