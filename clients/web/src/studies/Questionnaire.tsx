@@ -352,7 +352,7 @@ function Slider({ label, slider: { min, max, step, left, right }, value, onEnter
       />
       <div class={css.ends}>
         <span>{left}</span>
-        <span class={css.state} aria-hidden="true">
+        <span class="soft" aria-hidden="true">
           {value === undefined ? words.unset : "✓"}
         </span>
         <span>{right}</span>
