@@ -242,7 +242,6 @@ export function HandPick({ deck, text, golden, asksGolden, expected, fault, onCh
         value={text}
         fault={problem ? problemWords(problem) : fault}
         onText={(typed) => onChange({ text: typed })}
-        autoComplete="off"
         autoCapitalize="characters"
       />
       <Choice label={words.tap} cards={all.length}>

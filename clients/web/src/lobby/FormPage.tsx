@@ -44,7 +44,6 @@ export function FormFrame({ state, words, first, children, folded }: FormFramePr
           onText={(name) => state.change({ name })}
           fault={state.faults.name}
           maxLength={MAX_NAME}
-          autoComplete="off"
           placeholder={words.namePlaceholder}
         />
         {first}

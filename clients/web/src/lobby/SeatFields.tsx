@@ -85,7 +85,6 @@ export function SeatFields({ form, faults, change, agents }: SeatFieldsProps) {
                     change({ seatNames: form.seats.map((_, at) => (at === seat ? typed : (form.seatNames[at] ?? ""))) })
                   }
                   maxLength={MAX_NAME}
-                  autoComplete="off"
                 />
               )}
             </li>

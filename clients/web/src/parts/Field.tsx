@@ -63,6 +63,7 @@ interface TextProps extends FieldFrame {
   inputMode?: "numeric";
   name?: string;
   maxLength?: number;
+  /** What the browser offers to fill in; nothing by default. */
   autoComplete?: string;
   autoCapitalize?: "characters" | "none" | "words";
   placeholder?: string;
@@ -70,12 +71,12 @@ interface TextProps extends FieldFrame {
 }
 
 /** A line of text, or a local time as text. */
-export function TextField({ label, hint, fault, faultId, onText, type = "text", ...rest }: TextProps) {
+export function TextField(props: TextProps) {
+  const { label, hint, fault, faultId, onText, type = "text", autoComplete = "off", ...rest } = props;
+  const typed = { type: type as "text", autoComplete };
   return (
     <Field label={label} hint={hint} fault={fault} faultId={faultId}>
-      {(joined) => (
-        <input {...rest} {...joined} type={type as "text"} onInput={(event) => onText(event.currentTarget.value)} />
-      )}
+      {(joined) => <input {...rest} {...joined} {...typed} onInput={(event) => onText(event.currentTarget.value)} />}
     </Field>
   );
 }

@@ -43,7 +43,6 @@ export function ConditionFields(
           value={condition.id}
           onText={(id) => onChange({ id })}
           fault={faults[`condition.${index}`]}
-          autoComplete="off"
         />
         <SelectField
           label={words.opponents}
@@ -64,7 +63,6 @@ export function ConditionFields(
             value={condition.levels[factor] ?? ""}
             onText={(level) => onChange({ levels: { ...condition.levels, [factor]: level } })}
             fault={faults[`level.${index}.${factor}`]}
-            autoComplete="off"
           />
         ))}
       </div>
@@ -79,7 +77,6 @@ export function ConditionFields(
           value={condition.behaviour}
           onText={(behaviour) => onChange({ behaviour })}
           maxLength={MAX_BEHAVIOUR}
-          autoComplete="off"
         />
       )}
       {onRemove && (
@@ -106,7 +103,6 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
         onText={(text) => onChange({ text })}
         fault={faults[`question.${index}`]}
         maxLength={MAX_QUESTION}
-        autoComplete="off"
       />
       <div class={css.fields}>
         <SelectField

@@ -134,7 +134,6 @@ function FromForm() {
       value={form[name]}
       onText={(typed) => change({ [name]: typed })}
       fault={faults[name]}
-      autoComplete="off"
     />
   );
   const number = (name: "participants" | "people" | "games" | "shifts" | "minWidth", label: string, hint?: string) => (

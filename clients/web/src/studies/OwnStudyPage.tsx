@@ -64,7 +64,6 @@ function Unlock({ studyId, onKey }: { studyId: string; onKey: () => void }) {
         hint={words.keyHint}
         value={key}
         onText={setKey}
-        autoComplete="off"
         fault={tried ? words.keyHint : undefined}
       />
       <div>

@@ -40,7 +40,6 @@ export function AddAtTable({ tournamentId }: { tournamentId: string }) {
         value={name}
         onText={setName}
         maxLength={MAX_NAME}
-        autoComplete="off"
         fault={tried && name.trim() === "" ? t().organise.problems.nameMissing : undefined}
       />
       <SelectField

@@ -176,7 +176,6 @@ function Replace({ tournament, participant, agents, renew }: ChangeProps & { age
           value={name}
           onText={setName}
           maxLength={MAX_NAME}
-          autoComplete="off"
           fault={tried && name.trim() === "" ? t().organise.problems.nameMissing : undefined}
         />
       )}

@@ -44,7 +44,6 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
         value={code}
         onText={setCode}
         autoCapitalize="characters"
-        autoComplete="off"
         fault={tried && code.trim() === "" ? words.codeMissing : undefined}
       />
       <TextField
