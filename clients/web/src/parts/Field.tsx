@@ -59,6 +59,8 @@ interface TextProps extends FieldFrame {
   value: string;
   onText: (text: string) => void;
   type?: "text" | "datetime-local";
+  /** How many lines are shown; one by default, and then there is only one. */
+  rows?: number;
   /** For numbers. A field of the type "number" would say that it is empty where it shows "12px". */
   inputMode?: "numeric";
   name?: string;
@@ -70,13 +72,16 @@ interface TextProps extends FieldFrame {
   required?: boolean;
 }
 
-/** A line of text, or a local time as text. */
+/** Text, or a local time as text. */
 export function TextField(props: TextProps) {
-  const { label, hint, fault, faultId, onText, type = "text", autoComplete = "off", ...rest } = props;
-  const typed = { type: type as "text", autoComplete };
+  const { label, hint, fault, faultId, onText, rows, type = "text", autoComplete = "off", ...rest } = props;
+  const onInput = (event: { currentTarget: { value: string } }) => onText(event.currentTarget.value);
+  const typed = { ...rest, autoComplete, onInput };
   return (
     <Field label={label} hint={hint} fault={fault} faultId={faultId}>
-      {(joined) => <input {...rest} {...joined} {...typed} onInput={(event) => onText(event.currentTarget.value)} />}
+      {(joined) =>
+        rows ? <textarea {...typed} {...joined} rows={rows} /> : <input {...typed} {...joined} type={type as "text"} />
+      }
     </Field>
   );
 }

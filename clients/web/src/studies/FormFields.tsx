@@ -2,7 +2,7 @@
 
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
-import { CheckField, Field, SelectField, TextField } from "../parts/Field";
+import { CheckField, SelectField, TextField } from "../parts/Field";
 import css from "./Own.module.css";
 import type { ConditionForm, QuestionForm, StudyFaults } from "./study-form";
 
@@ -119,16 +119,13 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
         />
       </div>
       {question.kind === "choice" && (
-        <Field label={words.options} fault={faults[`options.${index}`]}>
-          {(joined) => (
-            <textarea
-              {...joined}
-              rows={4}
-              value={question.options}
-              onInput={(event) => onChange({ options: event.currentTarget.value })}
-            />
-          )}
-        </Field>
+        <TextField
+          label={words.options}
+          rows={4}
+          value={question.options}
+          onText={(options) => onChange({ options })}
+          fault={faults[`options.${index}`]}
+        />
       )}
       <CheckField label={words.optional} checked={question.optional} onCheck={(optional) => onChange({ optional })} />
       {onRemove && (

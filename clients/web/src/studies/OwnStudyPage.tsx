@@ -22,7 +22,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { download, fileName } from "../parts/download";
-import { CheckField, Field, TextField } from "../parts/Field";
+import { CheckField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { useStarted } from "../parts/started";
 import { zipped } from "../parts/zip";
@@ -343,11 +343,14 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
       <h2>{words.title}</h2>
       <div class={css.fields}>
         <TextField label={words.count} value={count} onText={setCount} inputMode="numeric" />
-        <Field label={words.names} hint={words.namesHint} fault={tried && !valid ? words.problem : undefined}>
-          {(joined) => (
-            <textarea {...joined} rows={2} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
-          )}
-        </Field>
+        <TextField
+          label={words.names}
+          hint={words.namesHint}
+          rows={2}
+          value={names}
+          onText={setNames}
+          fault={tried && !valid ? words.problem : undefined}
+        />
       </div>
       {size > 1 && (
         <CheckField
