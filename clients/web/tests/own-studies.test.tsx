@@ -488,7 +488,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   expect(erase.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, number: 1 });
   await press("Remove…");
   await press("Remove now");
-  expect(remove.mock.calls[0]?.[0]).toMatchObject({ number: 2, replace: false });
+  expect(remove.mock.calls[0]?.[0]).toEqual({ studyId: ID, ownerToken: TOKEN, number: 2 });
 });
 
 const OTHER = "0123456789abcdef0123456789abcdef";

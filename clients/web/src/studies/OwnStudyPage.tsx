@@ -529,7 +529,7 @@ function Row({ study, participant, onChanged }: RowProps) {
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
   const request = { ...ownership(study.studyId), number };
   /** The participant of the answer is as it is then. */
-  const act = async (call: Promise<{ participant?: StudyParticipant }>) => {
+  const act = async (call: Promise<{ participant?: StudyParticipant | undefined }>) => {
     const changed = (await call).participant;
     if (changed) onChanged(changed);
     return false;

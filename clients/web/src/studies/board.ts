@@ -1,9 +1,10 @@
 // The numbers on the progress board of a study.
 
 import { type Study, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+import type { Texts } from "../i18n/texts";
 
 /** The states in the order of the columns, with their names in the texts. */
-const STATES = new Map([
+const STATES = new Map<StudyParticipantState, keyof Texts["studies"]["own"]["state"]>([
   [StudyParticipantState.INVITED, "invited"],
   [StudyParticipantState.ACTIVE, "active"],
   [StudyParticipantState.COMPLETED, "completed"],
@@ -12,7 +13,7 @@ const STATES = new Map([
   [StudyParticipantState.REMOVED, "removed"],
   [StudyParticipantState.SCREENED_OUT, "screenedOut"],
   [StudyParticipantState.LEFT_OVER, "leftOver"],
-] as const);
+]);
 
 /** A state's name in the texts. */
 export function stateName(state: StudyParticipantState) {
