@@ -51,7 +51,6 @@ export const attend: Texts["attend"] = {
     correct: "Eine frühere Meldung berichtigen",
   },
   questions: {
-    title: "Fragen",
     picture: "Was die Kamera sieht",
     withdraw: "Keine Antwort",
     words: (text) => {
@@ -169,7 +168,6 @@ export const attend: Texts["attend"] = {
     passed: "gepasst",
     next: "ist dran",
   },
-  board: "Auf dem Brett",
   link: {
     title: "Auf einem Tablet neben dem Tisch",
     text: "Wer diese Adresse hat, kann für den Tisch melden. Zeige sie nur denen, die ihn betreuen.",

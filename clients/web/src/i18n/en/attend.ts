@@ -46,7 +46,6 @@ export const attend = {
     correct: "Correct an earlier report",
   },
   questions: {
-    title: "Questions",
     picture: "What the camera sees",
     withdraw: "No answer",
     /** The referee asks in English; see the Italian texts. */
@@ -155,7 +154,6 @@ export const attend = {
     passed: "passed",
     next: "to play",
   },
-  board: "On the board",
   link: {
     title: "On a tablet beside the table",
     text: "Anyone with this address can report about the table. Show it only to those who attend to it.",

@@ -50,7 +50,6 @@ export const attend: Texts["attend"] = {
     correct: "Corregir una anotación anterior",
   },
   questions: {
-    title: "Preguntas",
     picture: "Lo que ve la cámara",
     withdraw: "Sin respuesta",
     words: (text) => {
@@ -169,7 +168,6 @@ export const attend: Texts["attend"] = {
     passed: "ha pasado",
     next: "juega",
   },
-  board: "En el tablero",
   link: {
     title: "En una tableta junto a la mesa",
     text: "Quien tenga esta dirección puede anotar lo que pasa en la mesa. Enséñala solo a quienes la atienden.",

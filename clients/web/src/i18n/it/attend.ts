@@ -51,7 +51,6 @@ export const attend: Texts["attend"] = {
     correct: "Correggi una segnalazione precedente",
   },
   questions: {
-    title: "Domande",
     picture: "Che cosa vede la telecamera",
     withdraw: "Nessuna risposta",
     words: (text) => {
@@ -169,7 +168,6 @@ export const attend: Texts["attend"] = {
     passed: "ha passato",
     next: "gioca",
   },
-  board: "Sul piatto",
   link: {
     title: "Su un tablet accanto al tavolo",
     text: "Chi ha questo indirizzo può fare segnalazioni sul tavolo. Mostralo solo a chi assiste.",
