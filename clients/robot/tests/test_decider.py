@@ -115,7 +115,7 @@ def laid(table: Table, *cards: Card) -> None:
     """Lays cards on the first places and checks that this is said."""
     table.put(*range(len(cards)), cards=cards)
     table.wait()
-    assert outline(table.said()) == [(cards, False)]
+    assert outline(table.said()) == [(cards, True)]
 
 
 def test_a_place_that_never_looks_empty_does_not_turn_clearing_into_taking_back() -> None:
