@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -109,8 +110,7 @@ class Present(Largest):
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
-        with open(file, "w", encoding="utf-8") as opened:
-            opened.write(str(os.getpid()))
+        Path(file).write_text(str(os.getpid()), encoding="utf-8")
 
 
 class Slow(Present):
@@ -126,8 +126,7 @@ class Knowing(Largest):
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
-        with open(file, "w", encoding="utf-8") as opened:
-            opened.write(os.environ.get("CHEFSHAT_TICKET", "nothing"))
+        Path(file).write_text(os.environ.get("CHEFSHAT_TICKET", "nothing"), encoding="utf-8")
 
 
 class Babbling(Largest):
@@ -191,8 +190,7 @@ class Parent(Largest):
 
     def get_action(self, observations: Any) -> Any:
         program = subprocess.Popen(["sleep", "3600"])
-        with open(self.file, "w", encoding="utf-8") as opened:
-            opened.write(str(program.pid))
+        Path(self.file).write_text(str(program.pid), encoding="utf-8")
         os._exit(7)
 
 
@@ -215,8 +213,7 @@ class Stalling(Largest):
         self.actions += 1
         if self.actions == 5:
             command = os.getppid()
-            with open(self.file, "w", encoding="utf-8") as opened:
-                opened.write(str(os.getpid()))
+            Path(self.file).write_text(str(os.getpid()), encoding="utf-8")
             while os.getppid() == command:
                 time.sleep(0.01)
             os._exit(0)

@@ -5,7 +5,16 @@ from collections.abc import Iterator
 import pytest
 from fake_server import FakeServer
 from fake_vector import FakeVector
-from shared import anywhere, no_secrets, processes, pytest_collection_modifyitems, pytest_configure, real_address, real_binary  # noqa: F401 - pytest finds them here.
+from shared import (  # noqa: F401 - pytest finds them here.
+    anywhere,
+    no_secrets,
+    processes,
+    pytest_collection_modifyitems,
+    pytest_configure,
+    pytest_pyfunc_call,
+    real_address,
+    real_binary,
+)
 from stage import Stage, attached
 
 

@@ -1,8 +1,10 @@
-"""What the tests of this package and of those built on it share: the real server and the settings of JAX.
+"""What the tests of this package and of those built on it share: coroutines as tests, the real server and the settings of JAX.
 
 A `conftest.py` imports it. Contains no tests.
 """
 
+import asyncio
+import inspect
 import os
 import signal
 import subprocess
@@ -35,6 +37,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "real_binary" in getattr(item, "fixturenames", ()) and item.get_closest_marker("server") is None:
             raise pytest.UsageError(f"{item.nodeid} needs the real server: mark it with @pytest.mark.server")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Runs a test that is a coroutine in an event loop of its own."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj):
+        return None
+    asyncio.run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in inspect.signature(pyfuncitem.obj).parameters}))
+    return True
 
 
 @pytest.fixture(autouse=True)

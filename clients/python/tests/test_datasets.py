@@ -3,7 +3,6 @@
 import ast
 import hashlib
 import json
-import os
 import re
 import subprocess
 import sys
@@ -23,7 +22,6 @@ from waiting import wait_until
 
 import chefshat
 from chefshat import Agent, Decision, RandomAgent, pb
-from chefshat.local_server import BINARY
 
 pytestmark = pytest.mark.server
 
@@ -155,21 +153,12 @@ def export(binary: Path, records: Path, folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def binary() -> Path:
-    """The program."""
-    path = os.environ.get(BINARY)
-    if not path:
-        pytest.skip(f"{BINARY} is not set: name the chefshat binary to export with it")
-    return Path(path)
-
-
-@pytest.fixture(scope="module")
-def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+def hosted(real_binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     """Games hosted by a real server: one with expressions and a marker, one with invalid attempts."""
     data_dir = tmp_path_factory.mktemp("data")
     records = data_dir / "records"
     rules = pb.RuleSet(target_shifts=2)
-    with RealServer(binary, data_dir) as server, chefshat.Client(server.address) as client:
+    with RealServer(real_binary, data_dir) as server, chefshat.Client(server.address) as client:
         seats = [None, "random", "greedy", "random"]
         room = client.rooms.create("talk", rules=rules, policy=pb.RoomPolicy(hints=True), seats=seats)
         ticket = client.rooms.join(room.join_code, "Talkative").ticket
@@ -180,18 +169,18 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
         client.play(Stubborn(), client.rooms.join(room.join_code, "Stubborn").ticket)
         wait_until(lambda: len(list(records.glob("*.jsonl"))) >= 2, "the records of two finished games are there")
     folder = tmp_path_factory.mktemp("hosted")
-    export(binary, records, folder)
+    export(real_binary, records, folder)
     return Dataset(folder, records)
 
 
 @pytest.fixture(scope="module")
-def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+def simulated(real_binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     """Simulated games, with statistics collected during the simulation."""
     folder = tmp_path_factory.mktemp("simulated")
     records = folder / "records"
     arguments = ["simulate", "--games", GAMES, "--seed", 7, "--agents", ",".join(AGENTS), "--reward", "paper"]
-    metrics = run(binary, *arguments, "--records", records)
-    export(binary, records, folder)
+    metrics = run(real_binary, *arguments, "--records", records)
+    export(real_binary, records, folder)
     return Dataset(folder, records, metrics)
 
 

@@ -142,11 +142,10 @@ def test_an_installed_package_finds_the_checkout_of_the_working_directory(tmp_pa
 
 
 @pytest.mark.server
-def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    binary = os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set")
+def test_a_server_can_be_stopped_and_started_again(real_binary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Settings of the user's own server must not affect this one.
     monkeypatch.setenv("CHEFSHAT_DATA_DIR", "/no/such/folder")
-    with LocalServer(binary) as server:
+    with LocalServer(real_binary) as server:
         address = server.address
         assert server.running
         os.kill(server.pid, 0)  # Raises an error if there is no such process.
@@ -164,10 +163,9 @@ def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.server
+@pytest.mark.usefixtures("real_binary")
 @pytest.mark.parametrize("way", ["return", "raise", "kill"])
 def test_the_shared_server_stops_with_its_process(way: str) -> None:
-    if not os.environ.get(BINARY):
-        pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}
     done = subprocess.run([sys.executable, "-c", ORPHAN, way], capture_output=True, text=True, timeout=LIMIT_S, env=environment)
     codes = {"return": 0, "kill": -signal.SIGKILL}
@@ -179,10 +177,9 @@ def test_the_shared_server_stops_with_its_process(way: str) -> None:
 
 
 @pytest.mark.server
+@pytest.mark.usefixtures("real_binary")
 def test_no_call_is_left_when_the_interpreter_ends() -> None:
     """Deleting one then can wait for ever, if a thread of gRPC was stopped at the wrong moment."""
-    if not os.environ.get(BINARY):
-        pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}
     done = subprocess.run([sys.executable, "-c", LEFT_OPEN], capture_output=True, text=True, timeout=LIMIT_S, env=environment)
     assert (done.stdout.split(), done.stderr) == (["open:", "3", "left:", "0"], "")

@@ -1,7 +1,5 @@
 """Markers that a room's owner puts into its record, and following them across lost streams."""
 
-import asyncio
-
 import pytest
 
 import chefshat
@@ -30,20 +28,17 @@ def test_markers_reach_the_owner_once_and_in_order(address: str) -> None:
 
 
 @pytest.mark.server
-def test_a_marker_without_a_moment_marks_now(real_address: str) -> None:
-    async def mark() -> None:
-        async with aio.Client(real_address) as client:
-            created = await client.rooms.create("markers")
-            clock = await client.read_clock(created.room.room_id)
-            before = clock.room_offset
-            assert before is not None
-            sent = chefshat.clock.TIME_OF_DAY()
-            marker = await client.rooms.add_marker(created.room.room_id, created.owner_token, "EEG on")
-            done = chefshat.clock.TIME_OF_DAY()
-            moment = clock.local(marker.elapsed_us / 1e3)
-            assert sent - clock.error <= moment <= done + clock.error
-            async for followed in client.rooms.follow_markers(created.room.room_id, created.owner_token):
-                assert followed == marker
-                break
-
-    asyncio.run(mark())
+async def test_a_marker_without_a_moment_marks_now(real_address: str) -> None:
+    async with aio.Client(real_address) as client:
+        created = await client.rooms.create("markers")
+        clock = await client.read_clock(created.room.room_id)
+        before = clock.room_offset
+        assert before is not None
+        sent = chefshat.clock.TIME_OF_DAY()
+        marker = await client.rooms.add_marker(created.room.room_id, created.owner_token, "EEG on")
+        done = chefshat.clock.TIME_OF_DAY()
+        moment = clock.local(marker.elapsed_us / 1e3)
+        assert sent - clock.error <= moment <= done + clock.error
+        async for followed in client.rooms.follow_markers(created.room.room_id, created.owner_token):
+            assert followed == marker
+            break

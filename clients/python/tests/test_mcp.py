@@ -117,14 +117,11 @@ def listening(binary: Path, address: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_model_plays_a_game_over_standard_input_and_output(real_binary: Path, real_address: str, mode: str) -> None:
-    async def run() -> None:
-        async with over_stdio(real_binary, real_address, mode) as client:
-            assert (client.protocol_version == "2026-07-28") == (mode != "legacy")
-            assert ("Chef's Hat" in (client.instructions or "")) == (mode != "2026-07-28")
-            await plays_a_game(client, real_address, by_handle=False)
-
-    asyncio.run(run())
+async def test_a_model_plays_a_game_over_standard_input_and_output(real_binary: Path, real_address: str, mode: str) -> None:
+    async with over_stdio(real_binary, real_address, mode) as client:
+        assert (client.protocol_version == "2026-07-28") == (mode != "legacy")
+        assert ("Chef's Hat" in (client.instructions or "")) == (mode != "2026-07-28")
+        await plays_a_game(client, real_address, by_handle=False)
 
 
 @pytest.mark.parametrize("mode", MODES)

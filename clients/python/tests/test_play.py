@@ -3,31 +3,14 @@
 import asyncio
 import math
 import threading
-from collections.abc import Callable, Mapping
 
 import pytest
 from fake_game import QUESTIONS, FakeGame, FakeSeat
 from fake_server import FakeServer
+from playing import QUICK, Player, play_asyncio, play_blocking
 
 import chefshat
-from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, backoff, pb
-
-QUICK = Backoff(first_s=0.001, max_s=0.01)
-Results = dict[str, SeatResult]
-Player = Callable[[str, Mapping[str, Agent]], Results]
-
-
-def play_blocking(address: str, agents: Mapping[str, Agent]) -> Results:
-    with chefshat.Client(address, backoff=QUICK) as client:
-        return client.play_many(agents)
-
-
-def play_asyncio(address: str, agents: Mapping[str, Agent]) -> Results:
-    async def run() -> Results:
-        async with aio.Client(address, backoff=QUICK) as client:
-            return await client.play_many(agents)
-
-    return asyncio.run(run())
+from chefshat import Agent, ChefsHatError, Decision, RandomAgent, SeatResult, aio, backoff, pb
 
 
 @pytest.fixture(params=[play_blocking, play_asyncio], ids=["blocking", "asyncio"])
@@ -363,32 +346,29 @@ def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
         assert summary.game_id == client.rooms.get(made[3]).game_id
 
 
-def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
-    async def run() -> None:
-        async with aio.Client(fake.address) as client:
-            made = [(await client.rooms.create(f"room {number}")).room.room_id for number in range(5)]
-            assert [room.room_id async for room in client.rooms.list()] == made[::-1]
-            assert (await client.rooms.get(made[2])).name == "room 2"
-            assert (await client.server_info()).server_version == "fake"
-            assert (await client.action_table()).action_space.size == 214
-            room = await client.rooms.create(seats=[None, "random", "random", "random"])
-            joined = await client.rooms.join(room.join_code, "Ada")
-            await client.send_expression(joined.ticket, pb.Expression(label="joy"))
-            assert (await client.play(RandomAgent(1), joined.ticket)).place == 1
-            watched = [event.sequence async for event in client.rooms.watch(room.room.room_id)]
-            assert watched == list(range(1, len(watched) + 1))
-            assert [event.sequence async for event in client.rooms.watch(room.room.room_id, from_sequence=4)] == watched[3:]
-            fake.gone = 2
-            assert [event.sequence async for event in client.rooms.watch(room.room.room_id)] == watched[2:]
-            assert fake.watched_from[-2:] == [0, 3]
-            assert len([line async for line in client.records.read(room.room.game_id)]) == len(watched) + 2
-            names = [summary.room_name async for summary in client.records.list()]
-            assert names == [f"room {number}" for number in range(5)] + [""]
-            assert [summary.room_name async for summary in client.records.list(newest_first=True)] == names[::-1]
-            wanted = pb.RecordFilter(room_name="room 3")
-            assert [summary.room_name async for summary in client.records.list(wanted)] == ["room 3"]
-
-    asyncio.run(run())
+async def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
+    async with aio.Client(fake.address) as client:
+        made = [(await client.rooms.create(f"room {number}")).room.room_id for number in range(5)]
+        assert [room.room_id async for room in client.rooms.list()] == made[::-1]
+        assert (await client.rooms.get(made[2])).name == "room 2"
+        assert (await client.server_info()).server_version == "fake"
+        assert (await client.action_table()).action_space.size == 214
+        room = await client.rooms.create(seats=[None, "random", "random", "random"])
+        joined = await client.rooms.join(room.join_code, "Ada")
+        await client.send_expression(joined.ticket, pb.Expression(label="joy"))
+        assert (await client.play(RandomAgent(1), joined.ticket)).place == 1
+        watched = [event.sequence async for event in client.rooms.watch(room.room.room_id)]
+        assert watched == list(range(1, len(watched) + 1))
+        assert [event.sequence async for event in client.rooms.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+        fake.gone = 2
+        assert [event.sequence async for event in client.rooms.watch(room.room.room_id)] == watched[2:]
+        assert fake.watched_from[-2:] == [0, 3]
+        assert len([line async for line in client.records.read(room.room.game_id)]) == len(watched) + 2
+        names = [summary.room_name async for summary in client.records.list()]
+        assert names == [f"room {number}" for number in range(5)] + [""]
+        assert [summary.room_name async for summary in client.records.list(newest_first=True)] == names[::-1]
+        wanted = pb.RecordFilter(room_name="room 3")
+        assert [summary.room_name async for summary in client.records.list(wanted)] == ["room 3"]
 
 
 POINT = pb.BranchPoint(game_id="0f" * 16, decisions=40, same_deals=True)
@@ -396,7 +376,7 @@ HANDS = pb.ScriptedShift(hands=[pb.SeatCards(seat=0, cards=[1, 4, 12], golden=Tr
 PLAYER = pb.RecordedPlayer(game_id="0f" * 16, seat=2)
 
 
-def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
+async def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
     slow = pb.RoomPolicy(pace_ms=500)
     with chefshat.Client(fake.address) as client:
         client.rooms.create(seats=[PLAYER, "greedy", None, None], branch=POINT)
@@ -406,12 +386,8 @@ def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
         client.rooms.create(policy=slow)
         with pytest.raises(ValueError, match="not both"):
             client.rooms.create(branch=POINT, hands=HANDS)
-
-    async def run() -> None:
-        async with aio.Client(fake.address) as client:
-            await client.rooms.create(seats=[PLAYER, "greedy", None, None], branch=POINT)
-
-    asyncio.run(run())
+    async with aio.Client(fake.address) as client:
+        await client.rooms.create(seats=[PLAYER, "greedy", None, None], branch=POINT)
     branched, scripted, slow_ephemeral, private, plain, branched_too = fake.created
     assert len(branched.request_id) == 32
     assert branched.request_id != branched_too.request_id, "each call draws its own"

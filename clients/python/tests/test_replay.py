@@ -1,7 +1,6 @@
 """Replay: the buffer, and transitions from datasets and records, which equal those of the `VectorEnv` that played the games."""
 
 import json
-import os
 import subprocess
 import sys
 import tracemalloc
@@ -244,12 +243,6 @@ def test_a_buffer_stores_transitions_of_an_env() -> None:
     assert (drawn.before.observations.hands[:, 1] == drawn.seats).all()
 
 
-@pytest.fixture(scope="module")
-def binary() -> str:
-    """The binary."""
-    return os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set: name the chefshat binary to replay with it")
-
-
 def in_order(transitions: Transitions) -> list[Transitions]:
     """Returns the transitions of each game, by seat and in order; games by their first hands."""
     games = []
@@ -262,9 +255,7 @@ def in_order(transitions: Transitions) -> list[Transitions]:
 @pytest.mark.server
 @pytest.mark.parametrize("invalid", ["error", "ask_again"])
 @pytest.mark.parametrize("episode", ["shift", "game"])
-def test_records_give_the_transitions_of_the_played_games(
-    real_address: str, binary: str, tmp_path: Path, episode: str, invalid: str
-) -> None:
+def test_records_give_the_transitions_of_the_played_games(real_address: str, tmp_path: Path, episode: str, invalid: str) -> None:
     rng = np.random.default_rng(5)
     options: dict[str, Any] = {"rewards": "paper", "episode": episode}
     limit = 3 if invalid == "ask_again" else 0
@@ -308,11 +299,11 @@ def test_records_give_the_transitions_of_the_played_games(
 
 
 @pytest.mark.server
-def test_all_formats_of_a_dataset_give_the_same(binary: str, tmp_path: Path) -> None:
+def test_all_formats_of_a_dataset_give_the_same(real_binary: Path, tmp_path: Path) -> None:
     records, folder = tmp_path / "records", tmp_path / "dataset"
-    simulate = [binary, "simulate", "--games", "2", "--seed", "1", "--agents", "greedy,random,random_unmasked,random"]
+    simulate = [str(real_binary), "simulate", "--games", "2", "--seed", "1", "--agents", "greedy,random,random_unmasked,random"]
     subprocess.run([*simulate, "--records", str(records)], check=True, capture_output=True)
-    export = [binary, "export", str(records), "--out", str(folder), "--format", "parquet,jsonl,csv"]
+    export = [str(real_binary), "export", str(records), "--out", str(folder), "--format", "parquet,jsonl,csv"]
     subprocess.run(export, check=True, capture_output=True)
     made = [replay.from_dataset(folder / f"decisions.{form}", rewards="paper").flatten() for form in ("parquet", "jsonl", "csv")]
     assert len(made[0]["actions"]) > 400
@@ -326,7 +317,7 @@ def test_all_formats_of_a_dataset_give_the_same(binary: str, tmp_path: Path) -> 
 
 
 @pytest.mark.server
-def test_games_of_a_server(real_address: str, binary: str) -> None:
+def test_games_of_a_server(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.rooms.create("replayed", seats=[None, "greedy", "random", "random"], rules=pb.RuleSet(target_shifts=2))
         client.play(chefshat.RandomAgent(seed=1), client.rooms.join(room.join_code, "Ada").ticket)
@@ -367,7 +358,7 @@ def test_a_record_that_is_deleted_meanwhile_is_left_out(monkeypatch: pytest.Monk
 
 
 @pytest.mark.server
-def test_damaged_records_are_reported(binary: str, tmp_path: Path) -> None:
+def test_damaged_records_are_reported(real_binary: Path, tmp_path: Path) -> None:
     (tmp_path / "broken.jsonl").write_text("{}\n", encoding="utf-8")
     with pytest.raises(ChefsHatError, match=r"RECORDS_REFUSED.*damaged"):
         replay.from_records(tmp_path)

@@ -1,20 +1,17 @@
 """Games and tournaments that continue when their server is killed and restarted: agents only lose connections."""
 
-import asyncio
-import os
 import threading
 from collections import Counter
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from playing import Player, play_asyncio, play_blocking
 from real_server import RealServer
 from waiting import LIMIT_S
 
 import chefshat
-from chefshat import Agent, Backoff, Decision, RandomAgent, SeatInfo, SeatResult, aio, pb
-from chefshat.local_server import BINARY
+from chefshat import Backoff, Decision, RandomAgent, SeatInfo, SeatResult, pb
 
 pytestmark = pytest.mark.server
 
@@ -22,22 +19,6 @@ pytestmark = pytest.mark.server
 PATIENT = Backoff(first_s=0.005, max_s=0.05, attempts=2000)
 # Acknowledged decisions of the game after which the server is killed.
 KILLS = (5, 20, 21, 60)
-
-Agents = dict[str, Agent]
-Player = Callable[[str, Agents], dict[str, SeatResult]]
-
-
-def play_blocking(address: str, agents: Agents) -> dict[str, SeatResult]:
-    with chefshat.Client(address, backoff=PATIENT) as client:
-        return client.play_many(agents)
-
-
-def play_asyncio(address: str, agents: Agents) -> dict[str, SeatResult]:
-    async def run() -> dict[str, SeatResult]:
-        async with aio.Client(address, backoff=PATIENT) as client:
-            return await client.play_many(agents)
-
-    return asyncio.run(run())
 
 
 class Ledger:
@@ -82,26 +63,28 @@ class Noting(RandomAgent):
         self.ledger.accept(self.who, result)
 
 
+def kill_at_each_count(server: RealServer, ledger: Ledger) -> None:
+    """Kills the server and starts it again while the agents wait."""
+    for count in KILLS:
+        assert ledger.reached[count].wait(LIMIT_S)
+        server.kill()
+        ledger.killed[count].set()
+        server.start()
+
+
 @pytest.mark.parametrize("play", [play_blocking, play_asyncio], ids=["blocking", "asyncio"])
-def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
-    binary = os.environ.get(BINARY)
-    if not binary:
-        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+def test_agents_play_on_through_restarts(play: Player, real_binary: Path, tmp_path: Path) -> None:
     ledger = Ledger()
     results: dict[str, SeatResult] = {}
     # A separate address, so that no outgoing connection takes the server's port while it is down.
-    with RealServer(Path(binary), tmp_path, host="127.0.0.2") as server:
+    with RealServer(real_binary, tmp_path, host="127.0.0.2") as server:
         with chefshat.Client(server.address) as client:
             room = client.rooms.create(rules=pb.RuleSet(target_shifts=2))
             tickets = [client.rooms.join(room.join_code, f"player {seat}", seat=seat).ticket for seat in range(4)]
         agents = {ticket: Noting(seat, ledger, seat) for seat, ticket in enumerate(tickets)}
-        playing = threading.Thread(target=lambda: results.update(play(server.address, dict(agents))))
+        playing = threading.Thread(target=lambda: results.update(play(server.address, agents, PATIENT)))
         playing.start()
-        for count in KILLS:
-            assert ledger.reached[count].wait(LIMIT_S)
-            server.kill()
-            ledger.killed[count].set()
-            server.start()
+        kill_at_each_count(server, ledger)
         playing.join(LIMIT_S)
         assert not playing.is_alive()
         with chefshat.Client(server.address) as client:
@@ -121,10 +104,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))
 
 
-def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
-    binary = os.environ.get(BINARY)
-    if not binary:
-        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+def test_a_tournament_survives_restarts(real_binary: Path, tmp_path: Path) -> None:
     ledger = Ledger()
     agents: dict[tuple[str, int], Noting] = {}
 
@@ -148,17 +128,13 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
         built_in_agents=["random", "random"],
         start_when_joined=4,
     )
-    with RealServer(Path(binary), tmp_path, host="127.0.0.3") as server, ThreadPoolExecutor(2) as pool:
+    with RealServer(real_binary, tmp_path, host="127.0.0.3") as server, ThreadPoolExecutor(2) as pool:
         with chefshat.Client(server.address) as client:
             made = client.tournaments.create(settings)
             names = ("Ada", "Bob")
             tickets = [client.tournaments.join(made.join_code, name, max_games=2).ticket for name in names]
         playing = [pool.submit(play, ticket) for ticket in tickets]
-        for count in KILLS:
-            assert ledger.reached[count].wait(LIMIT_S)
-            server.kill()
-            ledger.killed[count].set()
-            server.start()
+        kill_at_each_count(server, ledger)
         played = [results.result(LIMIT_S) for results in playing]
         with chefshat.Client(server.address) as client:
             games = list(client.tournaments.games(made.tournament.tournament_id))
@@ -179,15 +155,12 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))
 
 
-def test_reports_about_a_table_wait_for_the_server(tmp_path: Path) -> None:
-    binary = os.environ.get(BINARY)
-    if not binary:
-        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+def test_reports_about_a_table_wait_for_the_server(real_binary: Path, tmp_path: Path) -> None:
     seats = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in ("Ada", "Bo", "Cy", "Di")]
     opening = pb.TableReport(laid=pb.CardsLaid(seat=0, cards=pb.SeenCards(cards=[11, 11], golden=True)))
     answer = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[9, 9])))
     with (
-        RealServer(Path(binary), tmp_path, host="127.0.0.4") as server,
+        RealServer(real_binary, tmp_path, host="127.0.0.4") as server,
         chefshat.Client(server.address, backoff=PATIENT) as client,
         ThreadPoolExecutor(1) as pool,
     ):

@@ -426,17 +426,13 @@ def test_an_interrupt_ends_everything(
 
 
 @pytest.mark.parametrize("child", ["", "import subprocess; subprocess.Popen(['sleep', '60']);"])
-def test_the_output_of_a_program_is_not_kept_but_for_its_end(child: str) -> None:
+async def test_the_output_of_a_program_is_not_kept_but_for_its_end(child: str) -> None:
     written = f"import sys; {child} [print('x' * 1023) for _ in range(4096)]; print('\x1bthe end', file=sys.stderr); sys.exit(3)"
 
-    async def played() -> rooms._Process:
-        command = Command(shlex.join([sys.executable, "-c", written]) + " {address} {code}")
-        async with rooms._Process(command, ServerAddress("localhost:1", token="")) as process:
-            assert await process.wait() == 3
-            assert process.last_lines().endswith("x\n  | the end")
-            return process
-
-    process = asyncio.run(played())
+    command = Command(shlex.join([sys.executable, "-c", written]) + " {address} {code}")
+    async with rooms._Process(command, ServerAddress("localhost:1", token="")) as process:
+        assert await process.wait() == 3
+        assert process.last_lines().endswith("x\n  | the end")
     assert len(process._output) == rooms.LAST_BYTES
 
 

@@ -4,10 +4,10 @@ import asyncio
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from playing import Player, play_asyncio, play_blocking
 from proxy import Proxy
 
 import chefshat
@@ -92,32 +92,26 @@ def test_a_game_over_one_blocking_stream(real_address: str) -> None:
         assert watched == next(iter(agents.values())).sequences[-len(watched) :]
 
 
-def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
-    async def run() -> None:
-        async with aio.Client(real_address) as client:
-            room = await client.rooms.create("asyncio")
-            agents = {}
-            for number in range(4):
-                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
-            check(agents, await client.play_many(agents))
-
-    asyncio.run(run())
+async def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
+    async with aio.Client(real_address) as client:
+        room = await client.rooms.create("asyncio")
+        agents = {}
+        for number in range(4):
+            agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
+        check(agents, await client.play_many(agents))
 
 
-def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
-    async def run() -> None:
-        async with aio.Client(real_address) as client:
-            room = await client.rooms.create("four streams", rules=pb.RuleSet(target_shifts=2))
-            agents = {}
-            for number in range(4):
-                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
-            games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
-            results: dict[str, chefshat.SeatResult] = {}
-            for result in await asyncio.gather(*games):
-                results |= result
-            check(agents, results)
-
-    asyncio.run(run())
+async def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
+    async with aio.Client(real_address) as client:
+        room = await client.rooms.create("four streams", rules=pb.RuleSet(target_shifts=2))
+        agents = {}
+        for number in range(4):
+            agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
+        games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
+        results: dict[str, chefshat.SeatResult] = {}
+        for result in await asyncio.gather(*games):
+            results |= result
+        check(agents, results)
 
 
 def test_a_game_of_four_processes(real_address: str, processes: list[subprocess.Popen[str]]) -> None:
@@ -154,23 +148,8 @@ class Cutter(Checking):
             self.proxy.cut()
 
 
-def play_blocking(address: str, agents: dict[str, Checking]) -> dict[str, chefshat.SeatResult]:
-    with chefshat.Client(address, backoff=QUICK) as client:
-        return client.play_many(agents)
-
-
-def play_asyncio(address: str, agents: dict[str, Checking]) -> dict[str, chefshat.SeatResult]:
-    async def run() -> dict[str, chefshat.SeatResult]:
-        async with aio.Client(address, backoff=QUICK) as client:
-            return await client.play_many(agents)
-
-    return asyncio.run(run())
-
-
 @pytest.mark.parametrize("play", [play_blocking, play_asyncio])
-def test_reconnections_miss_no_event(
-    real_address: str, play: Callable[[str, dict[str, Checking]], dict[str, chefshat.SeatResult]]
-) -> None:
+def test_reconnections_miss_no_event(real_address: str, play: Player) -> None:
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
         # Long time limits: the test is about lost decisions, not speed.
         policy = pb.RoomPolicy(decision_time_ms=60_000)
@@ -178,7 +157,7 @@ def test_reconnections_miss_no_event(
         agents: dict[str, Checking] = {}
         for number in range(4):
             agents[client.rooms.join(room.join_code, f"player {number}").ticket] = Cutter(number, proxy)
-        results = play(proxy.address, agents)
+        results = play(proxy.address, agents, QUICK)
         lines = list(client.records.read(room.room.game_id))
         assert proxy.cuts > 4
         assert all(0 < result.reconnects <= proxy.cuts for result in results.values())

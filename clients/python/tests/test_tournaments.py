@@ -329,45 +329,37 @@ def test_the_server_sees_a_client_leave_a_stream_early(fake: FakeServer, asynchr
         assert fake.tournaments.follower_left.wait(LIMIT_S)
 
 
-def test_a_stream_of_a_closed_client_says_so(fake: FakeServer) -> None:
-    async def follow() -> None:
-        client = aio.Client(fake.address)
-        tournament_id = (await client.tournaments.create(settings())).tournament.tournament_id
-        reports = client.tournaments.follow(tournament_id)
-        await anext(reports)
-        await client.close()
-        with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
-            await listed(reports)
-
-    asyncio.run(follow())
+async def test_a_stream_of_a_closed_client_says_so(fake: FakeServer) -> None:
+    client = aio.Client(fake.address)
+    tournament_id = (await client.tournaments.create(settings())).tournament.tournament_id
+    reports = client.tournaments.follow(tournament_id)
+    await anext(reports)
+    await client.close()
+    with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+        await listed(reports)
 
 
-def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
-    async def run() -> None:
-        async with aio.Client(fake.address, backoff=QUICK) as client:
-            ids = [
-                (await client.tournaments.create(settings("random", "random", "random"))).tournament.tournament_id for _ in range(3)
-            ]
-            assert [tournament.tournament_id for tournament in await listed(client.tournaments.list())] == ids[::-1]
-            assert not await listed(client.tournaments.list(pb.TOURNAMENT_STATE_CLOSED))
-            joined = await client.tournaments.join("CUP1", "Ada")
-            following = asyncio.create_task(listed(client.tournaments.follow(ids[0])))
-            played = await client.play_tournament(joined.ticket, Checking)
-            reports = await following
-            assert reports[-1].tournament.state == pb.TOURNAMENT_STATE_FINISHED
-            games = await listed(client.tournaments.games(ids[0]))
-            assert [game.game_id for game in games] == [result.game_id for result in played]
-            assert len((await client.tournaments.results(ids[0])).standings) == 4
-            assert (await client.tournaments.leaderboard()).games == 4
-            assert (await client.tournaments.start(ids[1], "owner")).state == pb.TOURNAMENT_STATE_PLAYING
-            assert (await client.tournaments.close(ids[1], "owner")).state == pb.TOURNAMENT_STATE_CLOSED
-            assert (await client.tournaments.get(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
-            with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
-                await listed(client.tournaments.follow("nowhere"))
-            with pytest.raises(ChefsHatError, match="GAME_NOT_PHYSICAL"):
-                await client.tournaments.physical_table(ids[0], "owner", 0)
-
-    asyncio.run(run())
+async def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
+    async with aio.Client(fake.address, backoff=QUICK) as client:
+        ids = [(await client.tournaments.create(settings("random", "random", "random"))).tournament.tournament_id for _ in range(3)]
+        assert [tournament.tournament_id for tournament in await listed(client.tournaments.list())] == ids[::-1]
+        assert not await listed(client.tournaments.list(pb.TOURNAMENT_STATE_CLOSED))
+        joined = await client.tournaments.join("CUP1", "Ada")
+        following = asyncio.create_task(listed(client.tournaments.follow(ids[0])))
+        played = await client.play_tournament(joined.ticket, Checking)
+        reports = await following
+        assert reports[-1].tournament.state == pb.TOURNAMENT_STATE_FINISHED
+        games = await listed(client.tournaments.games(ids[0]))
+        assert [game.game_id for game in games] == [result.game_id for result in played]
+        assert len((await client.tournaments.results(ids[0])).standings) == 4
+        assert (await client.tournaments.leaderboard()).games == 4
+        assert (await client.tournaments.start(ids[1], "owner")).state == pb.TOURNAMENT_STATE_PLAYING
+        assert (await client.tournaments.close(ids[1], "owner")).state == pb.TOURNAMENT_STATE_CLOSED
+        assert (await client.tournaments.get(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
+        with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
+            await listed(client.tournaments.follow("nowhere"))
+        with pytest.raises(ChefsHatError, match="GAME_NOT_PHYSICAL"):
+            await client.tournaments.physical_table(ids[0], "owner", 0)
 
 
 @pytest.mark.parametrize("more", [["--seed", "3"], ["--agent", "samples.careful_agent:Careful"]])

@@ -13,6 +13,7 @@ import grpc
 import numpy as np
 import pytest
 from chefshat import ChefsHatError, pb
+from waiting import LIMIT_S
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.deck import Card, deck
@@ -31,7 +32,7 @@ from chefshat_robot.vision import (
 )
 from chefshat_robot.vision.hand import HandReader, HandSeen
 from chefshat_robot.vision.perception import Perception
-from tests.loop import LIMIT_S, run, until
+from tests.loop import until
 
 CARDS = {face: [card for card in deck(0) if card.face == face] for face in range(1, 13)}
 FRAME = Frame(0, 0.0, np.zeros((4, 4, 3), dtype=np.uint8))
@@ -119,194 +120,161 @@ def laid(cards: list[Card], first: int = 1) -> Laid:
     return Laid(0, 0.0, tuple(cards), tuple(range(first, first + len(cards))))
 
 
-def answer(table: Table, bridge: Bridge, option: int | None) -> None:
+async def answer(table: Table, bridge: Bridge, option: int | None) -> None:
     """Answers the newest question, as the page does."""
     question = next(report.question for report in reversed(table.reports) if report.HasField("question"))
     table.state = pb.TableState(version=table.state.version + 1)
     table.state.answers.add(question_id=question.question_id, option=option)
-    run(bridge.run(iter([FRAME])))
+    await bridge.run(iter([FRAME]))
 
 
-def test_events_become_reports(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid([*CARDS[9][:2], CARDS[12][0]]))
-        await bridge.observed(PassShown(0, 0.0, 2))
-        await bridge.observed(Cleared(0, 0.0))
-        await bridge.observed(laid([CARDS[11][-1]]))
-
-    run(test())
+async def test_events_become_reports(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid([*CARDS[9][:2], CARDS[12][0]]))
+    await bridge.observed(PassShown(0, 0.0, 2))
+    await bridge.observed(Cleared(0, 0.0))
+    await bridge.observed(laid([CARDS[11][-1]]))
     assert table.kinds() == ["laid", "pass", "cleared", "laid"]
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9, 12], [], [], [11]]
     assert [report.laid.cards.golden for report in table.reports] == [False, False, False, True]
     assert all(report.source == pb.REPORT_SOURCE_CAMERA for report in table.reports)
 
 
-def test_a_pass_card_is_withdrawn_only_from_a_pizza_in_progress(table: Table, bridge: Bridge) -> None:
+async def test_a_pass_card_is_withdrawn_only_from_a_pizza_in_progress(table: Table, bridge: Bridge) -> None:
     table.state.observation.passed = bytes([0, 1, 0, 0])
 
-    async def test() -> None:
-        for seat in (1, 2):
-            await bridge.observed(PassShown(0, 0.0, seat))
-            await bridge.observed(PassWithdrawn(0, 0.0, seat))
-
-    run(test())
+    for seat in (1, 2):
+        await bridge.observed(PassShown(0, 0.0, seat))
+        await bridge.observed(PassWithdrawn(0, 0.0, seat))
     assert table.kinds() == ["pass", "pass_withdrawn", "pass"]
 
 
 @pytest.mark.parametrize(("option", "kind", "faces"), [(0, "correction", [9, 9, 9]), (1, "laid", [9])])
-def test_cards_of_one_face_beside_a_play_are_asked_about(
+async def test_cards_of_one_face_beside_a_play_are_asked_about(
     table: Table, bridge: Bridge, option: int, kind: str, faces: list[int]
 ) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(laid([CARDS[9][2]], first=3))
-
-    run(test())
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(laid([CARDS[9][2]], first=3))
     assert table.kinds() == ["laid", "question"]
-    answer(table, bridge, option)
+    await answer(table, bridge, option)
     last = table.reports[-1]
     assert last.WhichOneof("kind") == kind
     assert list((last.correction.instead if option == 0 else last).laid.cards.cards) == faces
 
 
-def test_cards_of_one_face_on_a_play_are_a_play_of_their_own(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(laid([CARDS[9][2]]))
-
-    run(test())
+async def test_cards_of_one_face_on_a_play_are_a_play_of_their_own(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(laid([CARDS[9][2]]))
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [9]]
 
 
-def test_who_laid_cards_is_named_if_its_side_of_the_field_shows_it(table: Table, bridge: Bridge) -> None:
+async def test_who_laid_cards_is_named_if_its_side_of_the_field_shows_it(table: Table, bridge: Bridge) -> None:
     table.state.seats.extend(pb.TableSeat(at_table=seat != 3) for seat in range(4))
 
-    async def test() -> None:
-        # The bridge learns of the seats from the answer to its first report.
-        await bridge.observed(PassShown(0, 0.0, 0))
-        await bridge.observed(replace(laid(CARDS[9][:2]), side=2))
-        await bridge.observed(replace(laid(CARDS[8][:2]), side=None))
-        # A remote seat lays nothing itself, and its cards may be laid from any side.
-        table.state.to_lay.add(seat=3, pizza=1, cards=pb.SeenCards(cards=[6, 6]))
-        await bridge.observed(replace(laid(CARDS[7][:2]), side=3))
-        await bridge.observed(replace(laid(CARDS[6][:2]), side=1))
-
-    run(test())
+    # The bridge learns of the seats from the answer to its first report.
+    await bridge.observed(PassShown(0, 0.0, 0))
+    await bridge.observed(replace(laid(CARDS[9][:2]), side=2))
+    await bridge.observed(replace(laid(CARDS[8][:2]), side=None))
+    # A remote seat lays nothing itself, and its cards may be laid from any side.
+    table.state.to_lay.add(seat=3, pizza=1, cards=pb.SeenCards(cards=[6, 6]))
+    await bridge.observed(replace(laid(CARDS[7][:2]), side=3))
+    await bridge.observed(replace(laid(CARDS[6][:2]), side=1))
     assert [report.laid.seat if report.laid.HasField("seat") else None for report in table.reports[1:]] == [2, None, None, None]
 
 
-def test_nothing_is_added_to_what_a_remote_seat_decided(table: Table, bridge: Bridge) -> None:
+async def test_nothing_is_added_to_what_a_remote_seat_decided(table: Table, bridge: Bridge) -> None:
     wanted = pb.CardsToLay(seat=3, pizza=1, cards=pb.SeenCards(cards=[9, 9]))
     table.state.to_lay.append(wanted)
 
-    async def test() -> None:
-        await bridge.observed(PassShown(0, 0.0, 2))
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(laid([CARDS[9][2]], first=3))
-
-    run(test())
+    await bridge.observed(PassShown(0, 0.0, 2))
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(laid([CARDS[9][2]], first=3))
     assert table.kinds() == ["pass", "laid", "laid"]
 
 
-def test_a_play_that_does_not_count_is_taken_back_without_a_question(table: Table, bridge: Bridge) -> None:
+async def test_a_play_that_does_not_count_is_taken_back_without_a_question(table: Table, bridge: Bridge) -> None:
     table.verdicts = [pb.REPORT_VERDICT_VIOLATION]
 
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
-        await bridge.observed(laid(CARDS[7][:2]))
-
-    run(test())
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
+    await bridge.observed(laid(CARDS[7][:2]))
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [7, 7]]
 
 
-def test_a_play_that_counts_is_taken_back_if_somebody_says_so(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
-
-    run(test())
+async def test_a_play_that_counts_is_taken_back_if_somebody_says_so(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
     assert table.kinds() == ["laid", "question"]
-    answer(table, bridge, 0)
+    await answer(table, bridge, 0)
     assert table.reports[-1].correction.report == 1
     assert not table.reports[-1].correction.HasField("instead")
 
 
-def test_what_happens_while_an_addition_is_asked_about_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:1]))
-        await bridge.observed(laid(CARDS[9][1:3], first=2))
-        await bridge.observed(laid(CARDS[5][:3]))
-        await bridge.observed(Cleared(0, 0.0))
-
-    run(test())
+async def test_what_happens_while_an_addition_is_asked_about_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:1]))
+    await bridge.observed(laid(CARDS[9][1:3], first=2))
+    await bridge.observed(laid(CARDS[5][:3]))
+    await bridge.observed(Cleared(0, 0.0))
     assert table.kinds() == ["laid", "question"]
-    answer(table, bridge, 0)
+    await answer(table, bridge, 0)
     assert table.kinds() == ["laid", "question", "correction", "laid", "cleared"]
     assert list(table.reports[2].correction.instead.laid.cards.cards) == [9, 9, 9]
 
 
-def test_a_play_taken_back_is_asked_about_before_the_next_is_reported(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
-        await bridge.observed(laid(CARDS[7][:2]))
-
-    run(test())
+async def test_a_play_taken_back_is_asked_about_before_the_next_is_reported(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
+    await bridge.observed(laid(CARDS[7][:2]))
     assert table.kinds() == ["laid", "question"]
-    answer(table, bridge, 0)
+    await answer(table, bridge, 0)
     assert table.kinds() == ["laid", "question", "correction", "laid"]
 
 
-def test_what_was_taken_from_a_board_that_is_then_cleared_was_swept_away(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(TakenBack(0, 0.0, (CARDS[9][0],), (1,)))
-        await bridge.observed(Cleared(0, 0.0))
-
-    run(test())
+async def test_what_was_taken_from_a_board_that_is_then_cleared_was_swept_away(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(TakenBack(0, 0.0, (CARDS[9][0],), (1,)))
+    await bridge.observed(Cleared(0, 0.0))
     assert table.kinds() == ["laid", "question", "answer", "cleared"]
     assert not table.reports[2].answer.HasField("option"), "the question is withdrawn"
 
 
-def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+async def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: Eyes, bridge: Bridge) -> None:
     picture = np.full((80, 60, 3), 200, dtype=np.uint8)
-    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, (CARDS[7][0], CARDS[9][0]), picture)))
+    await bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, (CARDS[7][0], CARDS[9][0]), picture))
     question = table.reports[-1].question
     assert (question.text, list(question.options)) == ("7 or 9 at place 1?", ["7", "9", "No new card"])
     assert question.picture.startswith(b"\xff\xd8")
-    answer(table, bridge, 1)
+    await answer(table, bridge, 1)
     assert eyes.answered == [(4, CARDS[9][0])]
     assert list(table.reports[-1].laid.cards.cards) == [9]
 
 
-def test_a_doubt_without_candidates_offers_every_face(table: Table, eyes: Eyes, bridge: Bridge) -> None:
-    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ())))
+async def test_a_doubt_without_candidates_offers_every_face(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    await bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ()))
     assert list(table.reports[-1].question.options) == [*map(str, range(1, 12)), "Joker", "No new card"]
-    answer(table, bridge, 12)
+    await answer(table, bridge, 12)
     assert eyes.answered == [(4, False)]
 
 
 @pytest.mark.parametrize("place", ["1", "pass 2"])
-def test_a_doubt_whose_question_somebody_withdraws_leaves_all_as_it_was(
+async def test_a_doubt_whose_question_somebody_withdraws_leaves_all_as_it_was(
     place: str, table: Table, eyes: Eyes, bridge: Bridge
 ) -> None:
-    run(bridge.observed(Doubt(0, 0.0, 4, place, 0.0, ())))
-    answer(table, bridge, None)
+    await bridge.observed(Doubt(0, 0.0, 4, place, 0.0, ()))
+    await answer(table, bridge, None)
     assert eyes.answered == [(4, None)]
 
 
-def test_an_answer_to_what_the_camera_could_read_after_all_changes_nothing(table: Table, eyes: Eyes, bridge: Bridge) -> None:
-    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ())))
+async def test_an_answer_to_what_the_camera_could_read_after_all_changes_nothing(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    await bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ()))
     eyes.resolved.add(4)
-    answer(table, bridge, 1)
+    await answer(table, bridge, 1)
     assert eyes.answered == []
 
 
-def test_questions_of_a_bridge_that_was_killed_are_withdrawn(table: Table, bridge: Bridge) -> None:
+async def test_questions_of_a_bridge_that_was_killed_are_withdrawn(table: Table, bridge: Bridge) -> None:
     table.state.questions.add(question_id="bridge-0001-doubt-1-1", text="Which card lies at place 1?")
     table.state.questions.add(question_id="referee-3", text="Did Bo pass?")
-    run(bridge.run(iter([FRAME])))
+    await bridge.run(iter([FRAME]))
     assert [report.answer.question_id for report in table.reports] == ["bridge-0001-doubt-1-1"]
     assert not table.reports[0].answer.HasField("option")
 
@@ -316,106 +284,88 @@ def found(cards: list[Card]) -> Laid:
 
 
 @pytest.mark.parametrize("is_new", [True, False])
-def test_cards_that_were_found_before_anybody_played_are_asked_about(is_new: bool, table: Table, bridge: Bridge) -> None:
-    run(bridge.observed(found(CARDS[8][:1])))
+async def test_cards_that_were_found_before_anybody_played_are_asked_about(is_new: bool, table: Table, bridge: Bridge) -> None:
+    await bridge.observed(found(CARDS[8][:1]))
     assert table.reports[-1].question.text == "8 found on the field: is it a new play?"
-    answer(table, bridge, 0 if is_new else 1)
+    await answer(table, bridge, 0 if is_new else 1)
     assert table.kinds() == ["question"] + ["laid"] * is_new
 
 
-def test_cards_that_are_found_one_after_the_other_are_one_question(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(found(CARDS[8][:1]))
-        await bridge.observed(replace(found(CARDS[8][1:2]), places=(2,)))
-
-    run(test())
+async def test_cards_that_are_found_one_after_the_other_are_one_question(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(found(CARDS[8][:1]))
+    await bridge.observed(replace(found(CARDS[8][1:2]), places=(2,)))
     assert table.kinds() == ["question", "answer", "question"]
-    answer(table, bridge, 0)
+    await answer(table, bridge, 0)
     assert list(table.reports[-1].laid.cards.cards) == [8, 8]
 
 
-def test_what_happens_after_something_was_found_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(found(CARDS[8][:1]))
-        await bridge.observed(laid(CARDS[5][:1]))
-        await bridge.observed(PassShown(0, 0.0, 2))
-        await bridge.observed(Cleared(0, 0.0))
-
-    run(test())
+async def test_what_happens_after_something_was_found_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(found(CARDS[8][:1]))
+    await bridge.observed(laid(CARDS[5][:1]))
+    await bridge.observed(PassShown(0, 0.0, 2))
+    await bridge.observed(Cleared(0, 0.0))
     assert table.kinds() == ["question"]
-    answer(table, bridge, 0)
+    await answer(table, bridge, 0)
     assert table.kinds() == ["question", "laid", "laid", "pass", "cleared"]
     assert [list(report.laid.cards.cards) for report in table.reports[1:3]] == [[8], [5]]
 
 
-def test_cards_that_were_found_and_are_swept_away_need_no_answer(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(found(CARDS[8][:1]))
-        await bridge.observed(PassShown(0, 0.0, 1, found=True))
-        await bridge.observed(PassWithdrawn(0, 0.0, 1))
-        await bridge.observed(Cleared(0, 0.0))
-
-    run(test())
+async def test_cards_that_were_found_and_are_swept_away_need_no_answer(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(found(CARDS[8][:1]))
+    await bridge.observed(PassShown(0, 0.0, 1, found=True))
+    await bridge.observed(PassWithdrawn(0, 0.0, 1))
+    await bridge.observed(Cleared(0, 0.0))
     assert table.kinds() == ["question", "question", "answer", "answer", "cleared"]
     assert table.reports[2].answer.question_id == table.reports[1].question.question_id
     assert table.reports[3].answer.question_id == table.reports[0].question.question_id
 
 
 @pytest.mark.parametrize(("pending", "asked"), [(False, False), (True, True)])
-def test_cards_that_were_found_in_a_pizza_are_asked_about_if_a_remote_seat_may_have_opened_it(
+async def test_cards_that_were_found_in_a_pizza_are_asked_about_if_a_remote_seat_may_have_opened_it(
     pending: bool, asked: bool, table: Table, bridge: Bridge
 ) -> None:
-    async def test() -> None:
-        table.state = pb.TableState(version=2)
-        table.state.observation.board_size = 2
-        if pending:
-            table.state.to_lay.add(seat=2, pizza=4, cards=pb.SeenCards(cards=[9, 9]))
-        await bridge.observed(Cleared(0, 0.0))
-        await bridge.observed(replace(found(CARDS[8][:2]), side=1))
-
-    run(test())
+    table.state = pb.TableState(version=2)
+    table.state.observation.board_size = 2
+    if pending:
+        table.state.to_lay.add(seat=2, pizza=4, cards=pb.SeenCards(cards=[9, 9]))
+    await bridge.observed(Cleared(0, 0.0))
+    await bridge.observed(replace(found(CARDS[8][:2]), side=1))
     assert table.kinds() == ["cleared", "question" if asked else "laid"]
     assert not table.reports[-1].laid.HasField("seat")
 
 
 @pytest.mark.parametrize("shown", [True, False])
-def test_a_pass_card_that_was_found_before_anybody_played_is_asked_about(shown: bool, table: Table, bridge: Bridge) -> None:
-    run(bridge.observed(PassShown(0, 0.0, 1, found=True)))
+async def test_a_pass_card_that_was_found_before_anybody_played_is_asked_about(shown: bool, table: Table, bridge: Bridge) -> None:
+    await bridge.observed(PassShown(0, 0.0, 1, found=True))
     assert table.reports[-1].question.text == "The pass card of seat 1 lies at its place: is it shown in this pizza?"
-    answer(table, bridge, 0 if shown else 1)
+    await answer(table, bridge, 0 if shown else 1)
     assert table.kinds() == ["question"] + ["pass"] * shown
 
 
-def test_questions_that_need_no_answer_any_more_are_withdrawn(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
-        await bridge.observed(DoubtResolved(0, 0.0, 4))
-        await bridge.observed(FieldChanged(0, 0.0, FieldState.LOST))
-        await bridge.observed(FieldChanged(0, 0.0, FieldState.FOUND))
-
-    run(test())
+async def test_questions_that_need_no_answer_any_more_are_withdrawn(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+    await bridge.observed(DoubtResolved(0, 0.0, 4))
+    await bridge.observed(FieldChanged(0, 0.0, FieldState.LOST))
+    await bridge.observed(FieldChanged(0, 0.0, FieldState.FOUND))
     asked = [report.question.question_id for report in table.reports if report.HasField("question")]
     withdrawn = [report.answer.question_id for report in table.reports if report.HasField("answer")]
     assert len(asked) == 2
     assert withdrawn == asked
 
 
-def test_a_game_that_a_remote_seat_ended_ends_the_bridge(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+async def test_a_game_that_a_remote_seat_ended_ends_the_bridge(table: Table, eyes: Eyes, bridge: Bridge) -> None:
     table.error = ChefsHatError("GAME_OVER", "the game is over")
     eyes.events = [[laid(CARDS[9][:2])]]
-    run(bridge.run(iter([FRAME])))
+    await bridge.run(iter([FRAME]))
     assert table.reports == []
 
 
-def test_no_two_questions_have_one_id_and_the_open_ones_end_with_the_bridge(table: Table, bridge: Bridge) -> None:
-    async def test() -> None:
-        await bridge.observed(laid(CARDS[9][:2]))
-        await bridge.observed(laid([CARDS[12][0]], first=5))
-        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
-        await bridge.observed(Doubt(0, 0.0, 5, "pass 3", 0.0, ()))
-        await bridge.run(iter([FRAME]))
-
-    run(test())
+async def test_no_two_questions_have_one_id_and_the_open_ones_end_with_the_bridge(table: Table, bridge: Bridge) -> None:
+    await bridge.observed(laid(CARDS[9][:2]))
+    await bridge.observed(laid([CARDS[12][0]], first=5))
+    await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+    await bridge.observed(Doubt(0, 0.0, 5, "pass 3", 0.0, ()))
+    await bridge.run(iter([FRAME]))
     asked = [report.question.question_id for report in table.reports if report.HasField("question")]
     withdrawn = [report.answer.question_id for report in table.reports if report.HasField("answer")]
     assert len(set(asked)) == len(asked) == 3
@@ -436,7 +386,7 @@ class Away(Table):
         return await super().report(table_ticket, report, report_id=report_id)
 
 
-def test_frames_are_watched_while_a_report_waits(eyes: Eyes) -> None:
+async def test_frames_are_watched_while_a_report_waits(eyes: Eyes) -> None:
     table = Away()
     bridge = Bridge(table, "ticket", cast("Perception", eyes))
     eyes.events = [[laid(CARDS[9][:2])], [], [laid(CARDS[7][:2])]]
@@ -450,35 +400,32 @@ def test_frames_are_watched_while_a_report_waits(eyes: Eyes) -> None:
             yield FRAME
         table.back.set()
 
-    run(bridge.run(frames()))
+    await bridge.run(frames())
     assert watched == [0, 0, 0, 0]
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [7, 7]]
 
 
-def test_a_server_that_is_away_is_reported(
+async def test_a_server_that_is_away_is_reported(
     bridge: Bridge, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("chefshat_robot.bridge.AWAY_S", 0.0)
     bridge.table = away = Away()
 
-    async def test() -> None:
-        reporting = asyncio.create_task(bridge.observed(laid(CARDS[9][:2])))
-        await until(lambda: "the server is away" in caplog.text)
-        away.back.set()
-        await reporting
-
-    run(test())
+    reporting = asyncio.create_task(bridge.observed(laid(CARDS[9][:2])))
+    await until(lambda: "the server is away" in caplog.text)
+    away.back.set()
+    await reporting
     assert away.kinds() == ["laid"]
 
 
-def test_a_report_that_the_table_gives_up_is_not_tried_again(table: Table, bridge: Bridge) -> None:
+async def test_a_report_that_the_table_gives_up_is_not_tried_again(table: Table, bridge: Bridge) -> None:
     table.error = ChefsHatError("UNAVAILABLE", "no server answers", code=grpc.StatusCode.UNAVAILABLE)
     with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
-        run(bridge.observed(laid(CARDS[9][:2])))
+        await bridge.observed(laid(CARDS[9][:2]))
     assert table.calls == 1
 
 
-def test_a_bridge_that_is_cancelled_ends_although_the_server_is_away(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_bridge_that_is_cancelled_ends_although_the_server_is_away(bridge: Bridge, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chefshat_robot.bridge.WITHDRAW_S", 0.01)
     away, watching = Away(), threading.Event()
 
@@ -486,16 +433,13 @@ def test_a_bridge_that_is_cancelled_ends_although_the_server_is_away(bridge: Bri
         watching.set()
         yield from itertools.repeat(FRAME)
 
-    async def test() -> None:
-        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
-        bridge.table = away
-        running = asyncio.create_task(bridge.run(frames()))
-        await until(watching.is_set)
-        running.cancel()
-        await asyncio.wait([running])
-        assert running.cancelled()
-
-    run(test())
+    await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+    bridge.table = away
+    running = asyncio.create_task(bridge.run(frames()))
+    await until(watching.is_set)
+    running.cancel()
+    await asyncio.wait([running])
+    assert running.cancelled()
     assert away.asked.is_set(), "it has tried to withdraw its question"
 
 
@@ -510,7 +454,7 @@ class Hand:
         return HandSeen(frame.index, frame.time, tuple(deck(0)[: self._seen]))
 
 
-def test_a_whole_hand_is_reported_when_the_table_waits_for_it(table: Table, bridge: Bridge) -> None:
+async def test_a_whole_hand_is_reported_when_the_table_waits_for_it(table: Table, bridge: Bridge) -> None:
     table.state = pb.TableState(version=1, stage=pb.TABLE_STAGE_HAND, seat=2)
     table.state.observation.cards_left = bytes([17, 17, 3, 17])
     bridge.state = table.state
@@ -518,7 +462,7 @@ def test_a_whole_hand_is_reported_when_the_table_waits_for_it(table: Table, brid
     def frames() -> Iterator[Frame]:
         yield from [FRAME] * 4
 
-    run(bridge.watch_hand(2, cast("HandReader", Hand()), frames()))
+    await bridge.watch_hand(2, cast("HandReader", Hand()), frames())
     (report,) = table.reports
     assert (report.hand.seat, list(report.hand.cards.cards)) == (2, [1, 2, 2])
 
@@ -530,7 +474,7 @@ class Same:
         return HandSeen(frame.index, frame.time, tuple(deck(0)[:3]))
 
 
-def test_a_hand_that_was_refused_is_not_reported_in_each_frame(
+async def test_a_hand_that_was_refused_is_not_reported_in_each_frame(
     table: Table, bridge: Bridge, caplog: pytest.LogCaptureFixture
 ) -> None:
     table.state = pb.TableState(version=1, stage=pb.TABLE_STAGE_HAND, seat=2)
@@ -544,13 +488,13 @@ def test_a_hand_that_was_refused_is_not_reported_in_each_frame(
         bridge.state = table.state
         yield from [FRAME] * 4
 
-    run(bridge.watch_hand(2, cast("HandReader", Same()), frames()))
+    await bridge.watch_hand(2, cast("HandReader", Same()), frames())
     assert table.kinds() == ["hand", "hand"]
     # The camera ended before the game.
     assert "no more pictures" in caplog.text
 
 
-def test_a_hand_whose_camera_fails_ends_only_its_own_watching(
+async def test_a_hand_whose_camera_fails_ends_only_its_own_watching(
     table: Table, bridge: Bridge, caplog: pytest.LogCaptureFixture
 ) -> None:
     bridge.state = table.state
@@ -559,5 +503,5 @@ def test_a_hand_whose_camera_fails_ends_only_its_own_watching(
         yield FRAME
         raise SourceError("camera 1 sends no more pictures; check its cable")
 
-    run(bridge.watch_hand(2, cast("HandReader", Same()), frames()))
+    await bridge.watch_hand(2, cast("HandReader", Same()), frames())
     assert "the hand of seat 2 gives no more pictures: camera 1 sends no more pictures; check its cable" in caplog.text

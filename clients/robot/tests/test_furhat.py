@@ -12,7 +12,7 @@ import pytest
 
 from chefshat_robot.drivers.driver import CardMove, Done, Express, Failed, Gaze, Heard, Pick, Point, Pose, RobotError, Say, attempt
 from chefshat_robot.drivers.furhat import FurhatDriver
-from tests.loop import run, until
+from tests.loop import until
 
 pytest.importorskip("furhat_realtime_api")
 server = pytest.importorskip("websockets.asyncio.server")
@@ -76,72 +76,60 @@ async def pair(*, listen: bool = False) -> AsyncIterator[tuple[FurhatDriver, Fur
             yield driver, furhat
 
 
-def test_it_speaks_looks_and_shows_moods_and_has_no_arms() -> None:
-    async def test() -> None:
-        async with pair() as (driver, furhat):
-            for said in (Say("Passo.", "it"), Say("Ancora.", "it")):
-                assert await attempt(driver, said, FAR_S) == Done()
-            assert [message["language"] for message in furhat.of("request.voice.config")] == ["it-IT"]
-            assert [message["text"] for message in furhat.of("request.speak.text")] == ["Passo.", "Ancora."]
+async def test_it_speaks_looks_and_shows_moods_and_has_no_arms() -> None:
+    async with pair() as (driver, furhat):
+        for said in (Say("Passo.", "it"), Say("Ancora.", "it")):
+            assert await attempt(driver, said, FAR_S) == Done()
+        assert [message["language"] for message in furhat.of("request.voice.config")] == ["it-IT"]
+        assert [message["text"] for message in furhat.of("request.speak.text")] == ["Passo.", "Ancora."]
 
-            # At seat 0, 300 mm before the field, its head 350 mm above the table; x to its right, y up, z forward.
-            assert await attempt(driver, Gaze(380.0, 200.0, 450.0), FAR_S) == Done()
-            assert await attempt(driver, Point(280.0, 100.0), FAR_S) == Done()
-            await until(lambda: len(furhat.of("request.attend.location")) == 2)
-            places = [(message["x"], message["y"], message["z"]) for message in furhat.of("request.attend.location")]
-            assert places == [(0.1, 0.1, 0.5), (0.0, -0.35, 0.6)]
+        # At seat 0, 300 mm before the field, its head 350 mm above the table; x to its right, y up, z forward.
+        assert await attempt(driver, Gaze(380.0, 200.0, 450.0), FAR_S) == Done()
+        assert await attempt(driver, Point(280.0, 100.0), FAR_S) == Done()
+        await until(lambda: len(furhat.of("request.attend.location")) == 2)
+        places = [(message["x"], message["y"], message["z"]) for message in furhat.of("request.attend.location")]
+        assert places == [(0.1, 0.1, 0.5), (0.0, -0.35, 0.6)]
 
-            assert await attempt(driver, Express("joy"), FAR_S) == Done()
-            assert await attempt(driver, Express("gloom", -0.8, -0.5), FAR_S) == Done()
-            assert [message["name"] for message in furhat.of("request.gesture.start")] == ["BigSmile", "ExpressSad"]
+        assert await attempt(driver, Express("joy"), FAR_S) == Done()
+        assert await attempt(driver, Express("gloom", -0.8, -0.5), FAR_S) == Done()
+        assert [message["name"] for message in furhat.of("request.gesture.start")] == ["BigSmile", "ExpressSad"]
 
-            pick = Pick((CardMove("9", None, Pose(0.0, 0.0)),))
-            assert await attempt(driver, pick, FAR_S) == Failed("Furhat has no arms")
-
-    run(test())
+        pick = Pick((CardMove("9", None, Pose(0.0, 0.0)),))
+        assert await attempt(driver, pick, FAR_S) == Failed("Furhat has no arms")
 
 
-def test_the_robot_can_fail_hang_leave_and_come_back() -> None:
-    async def test() -> None:
-        async with pair() as (driver, furhat):
-            furhat.aborts = True
-            assert await attempt(driver, Say("one"), FAR_S) == Failed("the speech was interrupted")
+async def test_the_robot_can_fail_hang_leave_and_come_back() -> None:
+    async with pair() as (driver, furhat):
+        furhat.aborts = True
+        assert await attempt(driver, Say("one"), FAR_S) == Failed("the speech was interrupted")
 
-            furhat.speaks = furhat.aborts = False
-            assert await attempt(driver, Say("two"), 0.2) == Failed("the robot did not finish within 0.2 s")
-            await until(lambda: furhat.of("request.speak.stop"))
+        furhat.speaks = furhat.aborts = False
+        assert await attempt(driver, Say("two"), 0.2) == Failed("the robot did not finish within 0.2 s")
+        await until(lambda: furhat.of("request.speak.stop"))
 
-            performing = asyncio.create_task(attempt(driver, Say("three"), FAR_S))
-            await until(lambda: any(message["text"] == "three" for message in furhat.of("request.speak.text")))
-            await furhat.hang_up()
-            assert await performing == Failed("the connection to Furhat was lost")
+        performing = asyncio.create_task(attempt(driver, Say("three"), FAR_S))
+        await until(lambda: any(message["text"] == "three" for message in furhat.of("request.speak.text")))
+        await furhat.hang_up()
+        assert await performing == Failed("the connection to Furhat was lost")
 
-            furhat.speaks = True
-            assert await attempt(driver, Say("four"), FAR_S) == Done()
-
-    run(test())
+        furhat.speaks = True
+        assert await attempt(driver, Say("four"), FAR_S) == Done()
 
 
-def test_it_listens() -> None:
-    async def test() -> None:
-        async with pair(listen=True) as (driver, furhat):
-            await until(lambda: furhat.of("request.listen.start"))
-            await furhat.hears("")
-            await furhat.hears("buongiorno")
-            assert await anext(driver.events()) == Heard("buongiorno")
-
-    run(test())
+async def test_it_listens() -> None:
+    async with pair(listen=True) as (driver, furhat):
+        await until(lambda: furhat.of("request.listen.start"))
+        await furhat.hears("")
+        await furhat.hears("buongiorno")
+        assert await anext(driver.events()) == Heard("buongiorno")
 
 
-def test_a_missing_robot_and_a_wrong_key_are_explained() -> None:
-    async def test() -> None:
-        async with server.serve(Furhat("secret").serve, "127.0.0.1", 0) as listening:
-            port = listening.sockets[0].getsockname()[1]
-            with pytest.raises(RobotError, match="refused the key: give key="):
-                await FurhatDriver(port=port, key="guess").connect()
-            async with FurhatDriver(port=port, key="secret") as driver:
-                assert driver.connected
-        with pytest.raises(RobotError, match=r"no Furhat at 127\.0\.0\.1:1"):
-            await FurhatDriver(port=1).connect()
-
-    run(test())
+async def test_a_missing_robot_and_a_wrong_key_are_explained() -> None:
+    async with server.serve(Furhat("secret").serve, "127.0.0.1", 0) as listening:
+        port = listening.sockets[0].getsockname()[1]
+        with pytest.raises(RobotError, match="refused the key: give key="):
+            await FurhatDriver(port=port, key="guess").connect()
+        async with FurhatDriver(port=port, key="secret") as driver:
+            assert driver.connected
+    with pytest.raises(RobotError, match=r"no Furhat at 127\.0\.0\.1:1"):
+        await FurhatDriver(port=1).connect()

@@ -34,7 +34,7 @@ from chefshat_robot.drivers.jsonlines import JsonLinesDriver
 from chefshat_robot.robot import play_seat
 from chefshat_robot.table import TableState, follow
 from chefshat_robot.words import Words
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import game_started, numbered, shift_started
 
 FAR_S = 3600.0
@@ -88,7 +88,7 @@ async def robot() -> AsyncIterator[Robot]:
         server.close()
 
 
-def test_every_act_goes_out_and_its_outcome_comes_back() -> None:
+async def test_every_act_goes_out_and_its_outcome_comes_back() -> None:
     acts: list[Act] = [
         Say("Passo.", "it"),
         Pick((CardMove("9", Pose(1.5, 2.0, 90.0), Pose(3.0, 4.0)), CardMove("joker", None, Pose(5.0, 6.0)))),
@@ -96,71 +96,61 @@ def test_every_act_goes_out_and_its_outcome_comes_back() -> None:
         Gaze(1.0, 2.0, 3.0),
         Express("joy", 0.5, -0.5),
     ]
-
-    async def test() -> None:
-        async with robot() as peer, drivers.create(f"jsonlines:port={peer.port}") as driver:
-            for number, act in enumerate(acts, 1):
-                performing = asyncio.create_task(attempt(driver, act, FAR_S))
-                identity = await peer.act(number)
-                peer.send(json.dumps({"type": "done", "id": identity}))
-                assert await performing == Done()
-            sent = [{name: value for name, value in line.items() if name not in ("type", "id")} for line in peer.acts()]
-        assert sent == [
-            {"act": "say", "text": "Passo.", "language": "it"},
-            {
-                "act": "pick",
-                "moves": [
-                    {"piece": "9", "start": {"x": 1.5, "y": 2.0, "angle": 90.0}, "end": {"x": 3.0, "y": 4.0, "angle": 0.0}},
-                    {"piece": "joker", "start": None, "end": {"x": 5.0, "y": 6.0, "angle": 0.0}},
-                ],
-            },
-            {"act": "point", "x": 1.0, "y": 2.0},
-            {"act": "gaze", "x": 1.0, "y": 2.0, "z": 3.0},
-            {"act": "express", "label": "joy", "valence": 0.5, "arousal": -0.5},
-        ]
-
-    run(test())
-
-
-def test_the_robot_can_fail_hang_leave_and_come_back() -> None:
-    async def test() -> None:
-        async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
-            performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
-            identity = await peer.act(1)
-            peer.send(json.dumps({"type": "failed", "id": identity, "reason": "no voice"}))
-            assert await performing == Failed("no voice")
-
-            assert await attempt(driver, Say("two"), 0.01) == Failed("the robot did not finish within 0.01 s")
-            await until(lambda: peer.got[-1] == {"type": "stop"})
-            peer.send(json.dumps({"type": "done", "id": peer.acts()[1]["id"]}))  # Too late: nobody waits.
-
-            performing = asyncio.create_task(attempt(driver, Say("three"), FAR_S))
-            await peer.act(3)
-            peer.hang_up()
-            assert await performing == Failed("the robot has closed its socket")
-
-            performing = asyncio.create_task(attempt(driver, Say("four"), FAR_S))
-            identity = await peer.act(4)
+    async with robot() as peer, drivers.create(f"jsonlines:port={peer.port}") as driver:
+        for number, act in enumerate(acts, 1):
+            performing = asyncio.create_task(attempt(driver, act, FAR_S))
+            identity = await peer.act(number)
             peer.send(json.dumps({"type": "done", "id": identity}))
             assert await performing == Done()
-            assert peer.connections == 2
+        sent = [{name: value for name, value in line.items() if name not in ("type", "id")} for line in peer.acts()]
+    assert sent == [
+        {"act": "say", "text": "Passo.", "language": "it"},
+        {
+            "act": "pick",
+            "moves": [
+                {"piece": "9", "start": {"x": 1.5, "y": 2.0, "angle": 90.0}, "end": {"x": 3.0, "y": 4.0, "angle": 0.0}},
+                {"piece": "joker", "start": None, "end": {"x": 5.0, "y": 6.0, "angle": 0.0}},
+            ],
+        },
+        {"act": "point", "x": 1.0, "y": 2.0},
+        {"act": "gaze", "x": 1.0, "y": 2.0, "z": 3.0},
+        {"act": "express", "label": "joy", "valence": 0.5, "arousal": -0.5},
+    ]
 
-    run(test())
+
+async def test_the_robot_can_fail_hang_leave_and_come_back() -> None:
+    async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
+        performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
+        identity = await peer.act(1)
+        peer.send(json.dumps({"type": "failed", "id": identity, "reason": "no voice"}))
+        assert await performing == Failed("no voice")
+
+        assert await attempt(driver, Say("two"), 0.01) == Failed("the robot did not finish within 0.01 s")
+        await until(lambda: peer.got[-1] == {"type": "stop"})
+        peer.send(json.dumps({"type": "done", "id": peer.acts()[1]["id"]}))  # Too late: nobody waits.
+
+        performing = asyncio.create_task(attempt(driver, Say("three"), FAR_S))
+        await peer.act(3)
+        peer.hang_up()
+        assert await performing == Failed("the robot has closed its socket")
+
+        performing = asyncio.create_task(attempt(driver, Say("four"), FAR_S))
+        identity = await peer.act(4)
+        peer.send(json.dumps({"type": "done", "id": identity}))
+        assert await performing == Done()
+        assert peer.connections == 2
 
 
-def test_a_robot_that_is_not_there_is_named_with_its_address() -> None:
-    async def test() -> None:
-        driver = JsonLinesDriver(port=1)
-        with pytest.raises(RobotError, match=r"no robot listens at 127\.0\.0\.1:1"):
-            await driver.connect()
-        outcome = await attempt(driver, Say("anyone?"), FAR_S)
-        assert isinstance(outcome, Failed)
-        assert "no robot listens" in outcome.reason
-
-    run(test())
+async def test_a_robot_that_is_not_there_is_named_with_its_address() -> None:
+    driver = JsonLinesDriver(port=1)
+    with pytest.raises(RobotError, match=r"no robot listens at 127\.0\.0\.1:1"):
+        await driver.connect()
+    outcome = await attempt(driver, Say("anyone?"), FAR_S)
+    assert isinstance(outcome, Failed)
+    assert "no robot listens" in outcome.reason
 
 
-def test_what_the_robot_perceives_is_reported_and_bad_lines_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
+async def test_what_the_robot_perceives_is_reported_and_bad_lines_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     bad = {
         "nonsense": "ignored a line",
         "[1]": "must be a JSON object",
@@ -181,39 +171,32 @@ def test_what_the_robot_perceives_is_reported_and_bad_lines_are_ignored(caplog: 
             "joy", valence=0.5, source="face", seat=2
         ),
     }
-
-    async def test() -> None:
-        async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
-            await until(lambda: peer.connections)
-            for line in [*bad, *good]:
-                peer.send(line)
-            events = driver.events()
-            assert [await anext(events) for _ in good] == list(good.values())
-
-    run(test())
+    async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
+        await until(lambda: peer.connections)
+        for line in [*bad, *good]:
+            peer.send(line)
+        events = driver.events()
+        assert [await anext(events) for _ in good] == list(good.values())
     for text in bad.values():
         assert text in caplog.text
 
 
-def test_events_and_states_of_the_game_are_shown() -> None:
-    async def test() -> None:
-        async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
-            state = TableState(seat=1)
-            for event in numbered(game_started(), shift_started()):
-                state = follow(state, event)
-                await driver.show_event(event)
-            await driver.show_state(state)
-            await until(lambda: len(peer.got) == 3)
-        dealt, shown = peer.got[1:]
-        assert (dealt["type"], dealt["kind"], dealt["sequence"], dealt["elapsed_ms"]) == ("event", "shift_started", 2, 200)
-        assert dealt["fields"]["hands"][0]["golden"] is True
-        assert (shown["type"], shown["seat"], shown["hand"][10], shown["golden"]) == ("state", 1, 5, True)
-
-    run(test())
+async def test_events_and_states_of_the_game_are_shown() -> None:
+    async with robot() as peer, JsonLinesDriver(port=peer.port) as driver:
+        state = TableState(seat=1)
+        for event in numbered(game_started(), shift_started()):
+            state = follow(state, event)
+            await driver.show_event(event)
+        await driver.show_state(state)
+        await until(lambda: len(peer.got) == 3)
+    dealt, shown = peer.got[1:]
+    assert (dealt["type"], dealt["kind"], dealt["sequence"], dealt["elapsed_ms"]) == ("event", "shift_started", 2, 200)
+    assert dealt["fields"]["hands"][0]["golden"] is True
+    assert (shown["type"], shown["seat"], shown["hand"][10], shown["golden"]) == ("state", 1, 5, True)
 
 
 @pytest.mark.server
-def test_a_game_with_a_robot_that_leaves_in_the_middle_and_comes_back(server_address: str) -> None:
+async def test_a_game_with_a_robot_that_leaves_in_the_middle_and_comes_back(server_address: str) -> None:
     notices: list[Notice] = []
 
     async def serve(peer: Robot, leave_after: int) -> None:
@@ -227,20 +210,17 @@ def test_a_game_with_a_robot_that_leaves_in_the_middle_and_comes_back(server_add
             else:
                 peer.send(json.dumps({"type": "done", "id": identity}))
 
-    async def test() -> list[dict[str, Any]]:
-        async with robot() as peer, aio.Client(server_address) as client:
-            serving = asyncio.create_task(serve(peer, leave_after=6))
-            made = await client.rooms.create("lines", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=1))
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            driver = JsonLinesDriver(port=peer.port)
-            result = await play_seat(client, seat.ticket, RandomAgent(7), driver, words=Words("en"), notify=notices.append)
-            assert result.finished
-            assert (result.late, result.invalid) == (0, 0)
-            serving.cancel()
-            assert peer.connections == 2
-            return peer.got
-
-    lines = run(test())
+    async with robot() as peer, aio.Client(server_address) as client:
+        serving = asyncio.create_task(serve(peer, leave_after=6))
+        made = await client.rooms.create("lines", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=1))
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        driver = JsonLinesDriver(port=peer.port)
+        result = await play_seat(client, seat.ticket, RandomAgent(7), driver, words=Words("en"), notify=notices.append)
+        assert result.finished
+        assert (result.late, result.invalid) == (0, 0)
+        serving.cancel()
+        assert peer.connections == 2
+        lines = peer.got
     acts = [line for line in lines if line["type"] == "act"]
     lost = acts[5]
     assert [notice.reason for notice in notices if notice.kind in ("help", "unsaid")] == (

@@ -28,7 +28,7 @@ from chefshat_robot.drivers.driver import (
 )
 from chefshat_robot.drivers.naoqi import NaoqiDriver
 from chefshat_robot.table import TableState
-from tests.loop import run, until
+from tests.loop import until
 
 qi = pytest.importorskip("qi")
 FAR_S = 3600.0
@@ -196,124 +196,103 @@ async def pair(**options: bool) -> AsyncIterator[tuple[NaoqiDriver, Pepper]]:
         await asyncio.to_thread(pepper.session.close)
 
 
-def test_acts_are_calls_of_services() -> None:
-    async def test() -> None:
-        async with pair() as (driver, pepper):
-            await driver.show_state(TableState(seat=1, names=("Ada", "Pepe", "Cleo", "Dan")))
-            for said in (Say("Passo.", "it"), Say("Ancora.", "it")):
-                assert await attempt(driver, said, FAR_S) == Done()
-            assert pepper.speech.calls == [("setLanguage", "Italian"), ("say", "Passo."), ("say", "Ancora.")]
+async def test_acts_are_calls_of_services() -> None:
+    async with pair() as (driver, pepper):
+        await driver.show_state(TableState(seat=1, names=("Ada", "Pepe", "Cleo", "Dan")))
+        for said in (Say("Passo.", "it"), Say("Ancora.", "it")):
+            assert await attempt(driver, said, FAR_S) == Done()
+        assert pepper.speech.calls == [("setLanguage", "Italian"), ("say", "Passo."), ("say", "Ancora.")]
 
-            # Seat 1 sits at the left, 300 mm from the field: it looks along x, and its left is away from seat 0.
-            assert await attempt(driver, Gaze(280.0, 200.0, 100.0), FAR_S) == Done()
-            assert await attempt(driver, Point(280.0, 50.0), FAR_S) == Done()
-            assert await attempt(driver, Point(280.0, 350.0), FAR_S) == Done()
-            looked, left, right = pepper.tracker.calls
-            assert looked == ("lookAt", [0.58, 0.0, 0.8], 2, False)
-            assert left == ("pointAt", "LArm", [0.58, 0.15, 0.7], 2)
-            assert right == ("pointAt", "RArm", [0.58, -0.15, 0.7], 2)
+        # Seat 1 sits at the left, 300 mm from the field: it looks along x, and its left is away from seat 0.
+        assert await attempt(driver, Gaze(280.0, 200.0, 100.0), FAR_S) == Done()
+        assert await attempt(driver, Point(280.0, 50.0), FAR_S) == Done()
+        assert await attempt(driver, Point(280.0, 350.0), FAR_S) == Done()
+        looked, left, right = pepper.tracker.calls
+        assert looked == ("lookAt", [0.58, 0.0, 0.8], 2, False)
+        assert left == ("pointAt", "LArm", [0.58, 0.15, 0.7], 2)
+        assert right == ("pointAt", "RArm", [0.58, -0.15, 0.7], 2)
 
-            assert await attempt(driver, Express("joy"), FAR_S) == Done()
-            assert await attempt(driver, Express("gloom", -0.8, -0.5), FAR_S) == Done()  # By the eyes: it has no such animation.
-            assert [call[1].rpartition("/")[2] for call in pepper.animations.calls] == ["Happy_4", "Sad_1"]
-            assert [call[2] for call in pepper.leds.calls] == [0xFFD040, 0x2040FF]
+        assert await attempt(driver, Express("joy"), FAR_S) == Done()
+        assert await attempt(driver, Express("gloom", -0.8, -0.5), FAR_S) == Done()  # By the eyes: it has no such animation.
+        assert [call[1].rpartition("/")[2] for call in pepper.animations.calls] == ["Happy_4", "Sad_1"]
+        assert [call[2] for call in pepper.leds.calls] == [0xFFD040, 0x2040FF]
 
-            assert await attempt(driver, PICK, FAR_S) == Done()
-            assert pepper.arm.calls[0][1][0]["end"] == {"x": 1.0, "y": 2.0, "angle": 0.0}
-            assert await attempt(driver, PICK, FAR_S) == Failed("the card slipped")
-
-    run(test())
+        assert await attempt(driver, PICK, FAR_S) == Done()
+        assert pepper.arm.calls[0][1][0]["end"] == {"x": 1.0, "y": 2.0, "angle": 0.0}
+        assert await attempt(driver, PICK, FAR_S) == Failed("the card slipped")
 
 
-def test_speech_with_gestures_is_preferred_and_without_an_arm_the_people_are_asked() -> None:
-    async def test() -> None:
-        async with pair(arm=False, animated=True) as (driver, pepper):
-            assert await attempt(driver, Say("Hello"), FAR_S) == Done()
-            assert pepper.animated.calls == [("say", "Hello")]
-            assert await attempt(driver, PICK, FAR_S) == Failed("this robot has no service ChefsHatArm that carries cards")
-
-    run(test())
+async def test_speech_with_gestures_is_preferred_and_without_an_arm_the_people_are_asked() -> None:
+    async with pair(arm=False, animated=True) as (driver, pepper):
+        assert await attempt(driver, Say("Hello"), FAR_S) == Done()
+        assert pepper.animated.calls == [("say", "Hello")]
+        assert await attempt(driver, PICK, FAR_S) == Failed("this robot has no service ChefsHatArm that carries cards")
 
 
-def test_the_robot_can_fail_hang_and_leave() -> None:
-    async def test() -> None:
-        async with pair() as (driver, pepper):
-            outcome = await attempt(driver, Say("hoarse"), FAR_S)
-            assert isinstance(outcome, Failed)
-            assert "no voice" in outcome.reason
+async def test_the_robot_can_fail_hang_and_leave() -> None:
+    async with pair() as (driver, pepper):
+        outcome = await attempt(driver, Say("hoarse"), FAR_S)
+        assert isinstance(outcome, Failed)
+        assert "no voice" in outcome.reason
 
-            assert await attempt(driver, Say("wait"), 0.3) == Failed("the robot did not finish within 0.3 s")
-            assert pepper.speech.calls[-1] == ("stopAll",)
-            assert pepper.tracker.calls == [("stopTracker",)]
+        assert await attempt(driver, Say("wait"), 0.3) == Failed("the robot did not finish within 0.3 s")
+        assert pepper.speech.calls[-1] == ("stopAll",)
+        assert pepper.tracker.calls == [("stopTracker",)]
 
-            pepper.speech.stopped.clear()
-            waiting = asyncio.create_task(attempt(driver, Say("wait for ever"), FAR_S))
-            await until(lambda: pepper.speech.calls[-1] == ("say", "wait for ever"))
-            closing = asyncio.create_task(asyncio.to_thread(pepper.session.close))
-            assert isinstance(await waiting, Failed)
-            pepper.speech.stopped.set()
-            await closing
-            await until(lambda: not driver.connected)
-            outcome = await attempt(driver, Say("anyone?"), FAR_S)
-            assert isinstance(outcome, Failed)
-            assert f"no NAOqi at {pepper.url}" in outcome.reason
-
-    run(test())
+        pepper.speech.stopped.clear()
+        waiting = asyncio.create_task(attempt(driver, Say("wait for ever"), FAR_S))
+        await until(lambda: pepper.speech.calls[-1] == ("say", "wait for ever"))
+        closing = asyncio.create_task(asyncio.to_thread(pepper.session.close))
+        assert isinstance(await waiting, Failed)
+        pepper.speech.stopped.set()
+        await closing
+        await until(lambda: not driver.connected)
+        outcome = await attempt(driver, Say("anyone?"), FAR_S)
+        assert isinstance(outcome, Failed)
+        assert f"no NAOqi at {pepper.url}" in outcome.reason
 
 
-def test_the_robot_wakes_up_attends_to_the_game_and_listens_for_words_until_it_is_given_back() -> None:
-    async def test() -> None:
-        pepper = await asyncio.to_thread(Pepper)
-        try:
-            async with NaoqiDriver(url=pepper.url, words="passo; tocca a me;") as driver:
-                assert driver.connected
-                assert pepper.motion.calls == [("wakeUp",)]
-                assert not pepper.awareness.enabled
-                assert pepper.recognition.calls == [("setVocabulary", ["passo", "tocca a me"], True), ("subscribe", "ChefsHat")]
-                assert not pepper.recognition.paused
-            assert pepper.awareness.enabled
-            assert pepper.recognition.calls[-1] == ("unsubscribe", "ChefsHat")
-            # One that did not turn to people before does not afterwards.
-            pepper.awareness.enabled = False
-            async with NaoqiDriver(url=pepper.url):
-                pass
+async def test_the_robot_wakes_up_attends_to_the_game_and_listens_for_words_until_it_is_given_back() -> None:
+    pepper = await asyncio.to_thread(Pepper)
+    try:
+        async with NaoqiDriver(url=pepper.url, words="passo; tocca a me;") as driver:
+            assert driver.connected
+            assert pepper.motion.calls == [("wakeUp",)]
             assert not pepper.awareness.enabled
-        finally:
-            await asyncio.to_thread(pepper.session.close)
+            assert pepper.recognition.calls == [("setVocabulary", ["passo", "tocca a me"], True), ("subscribe", "ChefsHat")]
+            assert not pepper.recognition.paused
+        assert pepper.awareness.enabled
+        assert pepper.recognition.calls[-1] == ("unsubscribe", "ChefsHat")
+        # One that did not turn to people before does not afterwards.
+        pepper.awareness.enabled = False
+        async with NaoqiDriver(url=pepper.url):
+            pass
+        assert not pepper.awareness.enabled
+    finally:
+        await asyncio.to_thread(pepper.session.close)
 
-    run(test())
 
-
-def test_a_robot_that_cannot_say_whether_it_turns_to_people_plays() -> None:
+async def test_a_robot_that_cannot_say_whether_it_turns_to_people_plays() -> None:
     class Older:
         """Has neither isEnabled nor setEnabled."""
 
-    async def test() -> None:
-        pepper = await asyncio.to_thread(Pepper, awareness=Older())
-        try:
-            async with NaoqiDriver(url=pepper.url) as driver:
-                assert await attempt(driver, Say("Hello"), FAR_S) == Done()
-        finally:
-            await asyncio.to_thread(pepper.session.close)
-
-    run(test())
+    pepper = await asyncio.to_thread(Pepper, awareness=Older())
+    try:
+        async with NaoqiDriver(url=pepper.url) as driver:
+            assert await attempt(driver, Say("Hello"), FAR_S) == Done()
+    finally:
+        await asyncio.to_thread(pepper.session.close)
 
 
-def test_words_and_touches_are_reported() -> None:
-    async def test() -> None:
-        async with pair() as (driver, pepper):
-            await asyncio.to_thread(pepper.memory.subscribers["WordRecognized"].signal, ["<...> passo <...>", 0.5, "gioco", 0.1])
-            await asyncio.to_thread(pepper.memory.subscribers["FrontTactilTouched"].signal, 0.0)
-            await asyncio.to_thread(pepper.memory.subscribers["FrontTactilTouched"].signal, 1.0)
-            events = driver.events()
-            assert {await anext(events), await anext(events)} == {Heard("passo", 0.5), Button("FrontTactilTouched")}
-
-    run(test())
+async def test_words_and_touches_are_reported() -> None:
+    async with pair() as (driver, pepper):
+        await asyncio.to_thread(pepper.memory.subscribers["WordRecognized"].signal, ["<...> passo <...>", 0.5, "gioco", 0.1])
+        await asyncio.to_thread(pepper.memory.subscribers["FrontTactilTouched"].signal, 0.0)
+        await asyncio.to_thread(pepper.memory.subscribers["FrontTactilTouched"].signal, 1.0)
+        events = driver.events()
+        assert {await anext(events), await anext(events)} == {Heard("passo", 0.5), Button("FrontTactilTouched")}
 
 
-def test_a_robot_that_is_not_there_is_an_error_that_says_what_to_do() -> None:
-    async def test() -> None:
-        with pytest.raises(RobotError, match="switch the robot on, or give host="):
-            await NaoqiDriver(port=1).connect()
-
-    run(test())
+async def test_a_robot_that_is_not_there_is_an_error_that_says_what_to_do() -> None:
+    with pytest.raises(RobotError, match="switch the robot on, or give host="):
+        await NaoqiDriver(port=1).connect()

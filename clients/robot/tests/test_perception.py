@@ -583,6 +583,15 @@ def test_files_that_cannot_be_read_or_written_are_named(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", [["bridge", "--ticket", "T"], ["perceive"]])
+def test_a_source_that_cannot_be_opened_leaves_no_recording(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([*command, str(tmp_path / "no.mp4"), "--record", str(tmp_path / "recording")]) == 1
+    assert "no.mp4" in capsys.readouterr().err
+    assert not (tmp_path / "recording").exists()
+
+
 def test_a_full_disk_ends_a_command_with_its_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ from chefshat_robot.reporting import report_of
 from chefshat_robot.robot import play_seat
 from chefshat_robot.table import TableState
 from chefshat_robot.words import Words
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import SEATS, ScriptedRobot
 
 ROBOT, DAN = 0, 3
@@ -86,26 +86,22 @@ def _turn(seat: int, cards: pb.SeenCards) -> pb.TableReport:
 
 
 @pytest.mark.server
-def test_a_robot_plays_a_shift_at_a_physical_table(server_address: str, caplog: pytest.LogCaptureFixture) -> None:
+async def test_a_robot_plays_a_shift_at_a_physical_table(server_address: str, caplog: pytest.LogCaptureFixture) -> None:
     robot = ScriptedRobot()
-
-    async def test() -> list[pb.RecordLine]:
-        async with aio.Client(server_address) as client:
-            rules = pb.RuleSet(target_shifts=1)
-            dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
-            policy = pb.RoomPolicy(pace_ms=0)
-            seats = [None, "greedy", "random", dan]
-            made = await client.rooms.create("real", seats=seats, rules=rules, policy=policy, physical=True)
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
-            attendant = Attendant(client, made.table_ticket)
-            attending = asyncio.create_task(attendant.attend())
-            result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), table_ticket=made.table_ticket)
-            assert result.finished
-            await attending
-            assert attendant.refused == []
-            return [line async for line in client.records.read(result.game_id)]
-
-    record = run(test())
+    async with aio.Client(server_address) as client:
+        rules = pb.RuleSet(target_shifts=1)
+        dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
+        policy = pb.RoomPolicy(pace_ms=0)
+        seats = [None, "greedy", "random", dan]
+        made = await client.rooms.create("real", seats=seats, rules=rules, policy=policy, physical=True)
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+        attendant = Attendant(client, made.table_ticket)
+        attending = asyncio.create_task(attendant.attend())
+        result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), table_ticket=made.table_ticket)
+        assert result.finished
+        await attending
+        assert attendant.refused == []
+        record = [line async for line in client.records.read(result.game_id)]
     assert "did not accept" not in caplog.text
     assert not any(line.event.HasField("violation") for line in record)
     plays = [line.event.play for line in record if line.event.HasField("play") and line.event.play.seat == ROBOT]
@@ -137,43 +133,40 @@ def test_what_a_robot_carries_is_a_report() -> None:
 
 
 @pytest.mark.server
-def test_a_robot_says_violations_and_asks_the_tables_questions(server_address: str) -> None:
+async def test_a_robot_says_violations_and_asks_the_tables_questions(server_address: str) -> None:
     robot = ScriptedRobot()
     question = pb.TableQuestion(question_id="q1", text="7 or 9 at place 4?", options=["7", "9"])
 
     def said(text: str) -> bool:
         return any(isinstance(act, Say) and act.text == text for act in robot.acts)
 
-    async def test() -> None:
-        async with aio.Client(server_address) as client:
-            rules = pb.RuleSet(target_shifts=1)
-            dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
-            made = await client.rooms.create("doubt", seats=[None, dan, dan, dan], rules=rules, physical=True)
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
-            ticket = made.table_ticket
-            playing = asyncio.create_task(
-                play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("it"), table_ticket=ticket, referee=True)
-            )
-            await until(lambda: robot.seen)
-            hand = pb.SeenCards(cards=[2, 2, 5, 7, 9, 9, 9, 10, 10, 10, 11, 11, 11, 11, 11, 12, 12], golden=False)
-            assert (await client.tables.report(ticket, pb.TableReport(hand=pb.HandSeen(seat=ROBOT, cards=hand)))).verdict == 1
-            # Nobody may open a Shift with a 3.
-            wrong = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[3], golden=False)))
-            violation = await client.tables.report(ticket, wrong)
-            assert violation.verdict == pb.REPORT_VERDICT_VIOLATION
-            await until(lambda: said(violation.detail))
+    async with aio.Client(server_address) as client:
+        rules = pb.RuleSet(target_shifts=1)
+        dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
+        made = await client.rooms.create("doubt", seats=[None, dan, dan, dan], rules=rules, physical=True)
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+        ticket = made.table_ticket
+        playing = asyncio.create_task(
+            play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("it"), table_ticket=ticket, referee=True)
+        )
+        await until(lambda: robot.seen)
+        hand = pb.SeenCards(cards=[2, 2, 5, 7, 9, 9, 9, 10, 10, 10, 11, 11, 11, 11, 11, 12, 12], golden=False)
+        assert (await client.tables.report(ticket, pb.TableReport(hand=pb.HandSeen(seat=ROBOT, cards=hand)))).verdict == 1
+        # Nobody may open a Shift with a 3.
+        wrong = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[3], golden=False)))
+        violation = await client.tables.report(ticket, wrong)
+        assert violation.verdict == pb.REPORT_VERDICT_VIOLATION
+        await until(lambda: said(violation.detail))
 
-            await client.tables.report(ticket, pb.TableReport(question=question))
-            await until(lambda: said("7 or 9 at place 4?"))
-            for heard in (Heard("seven or nine?"), Heard("nine", 0.2), Heard("It is a nine.", 0.9)):
-                robot.report(heard)
-            async for state in client.tables.watch(ticket):
-                if not state.questions:
-                    break
-            await client.rooms.close(made.room.room_id, made.owner_token)
-            assert (await playing).abort_reason == "CLOSED"
-
-    run(test())
+        await client.tables.report(ticket, pb.TableReport(question=question))
+        await until(lambda: said("7 or 9 at place 4?"))
+        for heard in (Heard("seven or nine?"), Heard("nine", 0.2), Heard("It is a nine.", 0.9)):
+            robot.report(heard)
+        async for state in client.tables.watch(ticket):
+            if not state.questions:
+                break
+        await client.rooms.close(made.room.room_id, made.owner_token)
+        assert (await playing).abort_reason == "CLOSED"
 
 
 @pytest.mark.parametrize(

@@ -41,37 +41,33 @@ async def _page(client: aio.Client, ticket: str, answered: list[str], rehearsal:
 
 @pytest.mark.server
 @pytest.mark.slow
-def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(server_address: str, tmp_path: Path) -> None:
+async def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(server_address: str, tmp_path: Path) -> None:
     robot = ScriptedRobot()
     answered: list[str] = []
+    async with aio.Client(server_address) as client:
+        people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE]
+        made = await client.rooms.create("whole", seats=[*people, None, None], rules=pb.RuleSet(target_shifts=1), physical=True)
+        ticket = made.table_ticket
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+        other = await client.rooms.join(made.join_code, "remote", seat=REMOTE)
+        table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
+        rehearsal = Rehearsal(table, client.tables, ticket, seed=2, mistakes=0.25, face_down=0.5, answers=False)
+        bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0))
 
-    async def test() -> tuple[Rehearsal, list[pb.RecordLine]]:
-        async with aio.Client(server_address) as client:
-            people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE]
-            made = await client.rooms.create("whole", seats=[*people, None, None], rules=pb.RuleSet(target_shifts=1), physical=True)
-            ticket = made.table_ticket
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
-            other = await client.rooms.join(made.join_code, "remote", seat=REMOTE)
-            table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
-            rehearsal = Rehearsal(table, client.tables, ticket, seed=2, mistakes=0.25, face_down=0.5, answers=False)
-            bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0))
+        async def after(frame: Frame) -> None:
+            if bridge.state is not None:
+                await rehearsal.step(bridge.state, frame.time)
 
-            async def after(frame: Frame) -> None:
-                if bridge.state is not None:
-                    await rehearsal.step(bridge.state, frame.time)
-
-            page = asyncio.create_task(_page(client, ticket, answered, rehearsal))
-            remote = asyncio.create_task(client.play(RandomAgent(5), other.ticket))
-            playing = asyncio.create_task(play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), referee=True))
-            async with asyncio.timeout(LIMIT_S):
-                await bridge.run(rehearsal.frames(), after)
-                result = await playing
-                await remote
-            page.cancel()
-            assert result.finished
-            return rehearsal, [line async for line in client.records.read(result.game_id)]
-
-    rehearsal, record = asyncio.run(test())
+        page = asyncio.create_task(_page(client, ticket, answered, rehearsal))
+        remote = asyncio.create_task(client.play(RandomAgent(5), other.ticket))
+        playing = asyncio.create_task(play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), referee=True))
+        async with asyncio.timeout(LIMIT_S):
+            await bridge.run(rehearsal.frames(), after)
+            result = await playing
+            await remote
+        page.cancel()
+        assert result.finished
+        record = [line async for line in client.records.read(result.game_id)]
     events = [line.event for line in record if line.HasField("event")]
     plays = [event.play for event in events if event.HasField("play")]
     recorded = [(play.seat, Counter({play.face: play.quantity}) + Counter({FACES + 1: play.jokers})) for play in plays]

@@ -19,7 +19,6 @@ from chefshat_robot.player import RobotPlayer
 from chefshat_robot.robot import attendant, play_seat
 from chefshat_robot.running import Sender, live_from
 from chefshat_robot.words import TEXTS, Words
-from tests.loop import run
 from tests.robots import ScriptedRobot
 
 ONE_SHIFT = pb.RuleSet(target_shifts=1)
@@ -45,20 +44,16 @@ async def own_turns(client: aio.Client, game_id: str, seat: int) -> list[Turn]:
 
 @pytest.mark.server
 @pytest.mark.parametrize("jammed", [False, True])
-def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, jammed: bool) -> None:
+async def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, jammed: bool) -> None:
     robot = ScriptedRobot(lambda act: Failed("jammed") if jammed and isinstance(act, Pick) else Done())
     notices: list[Notice] = []
-
-    async def test() -> tuple[list[Turn], list[pb.RecordLine]]:
-        async with aio.Client(server_address) as client:
-            seat = await client.rooms.join(await room(client), "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), notify=notices.append)
-            assert result.finished
-            assert (result.late, result.invalid) == (0, 0)
-            turns = await own_turns(client, result.game_id, result.seat)
-            return turns, [line async for line in client.records.read(result.game_id)]
-
-    turns, record = run(test())
+    async with aio.Client(server_address) as client:
+        seat = await client.rooms.join(await room(client), "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), notify=notices.append)
+        assert result.finished
+        assert (result.late, result.invalid) == (0, 0)
+        turns = await own_turns(client, result.game_id, result.seat)
+        record = [line async for line in client.records.read(result.game_id)]
     assert turns
     cards = [[move.piece for move in act.moves if move.piece != "pass"] for act in robot.acts if isinstance(act, Pick)]
     laid = [pieces for pieces in cards if pieces]
@@ -84,47 +79,41 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
 
 
 @pytest.mark.server
-def test_what_a_robot_reads_in_faces_becomes_expressions_of_their_seats(server_address: str) -> None:
-    async def test() -> list[pb.Expression]:
-        async with aio.Client(server_address) as client:
-            made = await client.rooms.create(
-                "faces", seats=[None, None, "random", "greedy"], rules=ONE_SHIFT, policy=pb.RoomPolicy(pace_ms=0)
-            )
-            person = await client.rooms.join(made.join_code, "Ada", kind=pb.PARTICIPANT_KIND_HUMAN)
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            robot = ScriptedRobot()
-            for affect in (Affect("joy", 0.5, seat=0, source="face"), Affect("sadness", seat=3)):
-                robot.report(affect)
-            people = Forwarder(client, {0: person.ticket})
-            playing = asyncio.create_task(client.play(RandomAgent(1), person.ticket))
-            result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), people=people)
-            await playing
-            lines = [line async for line in client.records.read(result.game_id)]
-            return [line.event.expression_shown.expression for line in lines if line.event.expression_shown.seat == person.seat]
-
-    shown = [expression for expression in run(test()) if expression.label]
+async def test_what_a_robot_reads_in_faces_becomes_expressions_of_their_seats(server_address: str) -> None:
+    async with aio.Client(server_address) as client:
+        made = await client.rooms.create(
+            "faces", seats=[None, None, "random", "greedy"], rules=ONE_SHIFT, policy=pb.RoomPolicy(pace_ms=0)
+        )
+        person = await client.rooms.join(made.join_code, "Ada", kind=pb.PARTICIPANT_KIND_HUMAN)
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        robot = ScriptedRobot()
+        for affect in (Affect("joy", 0.5, seat=0, source="face"), Affect("sadness", seat=3)):
+            robot.report(affect)
+        people = Forwarder(client, {0: person.ticket})
+        playing = asyncio.create_task(client.play(RandomAgent(1), person.ticket))
+        result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), people=people)
+        await playing
+        lines = [line async for line in client.records.read(result.game_id)]
+        expressions = [line.event.expression_shown.expression for line in lines if line.event.expression_shown.seat == person.seat]
+    shown = [expression for expression in expressions if expression.label]
     assert [(expression.label, expression.valence, expression.source) for expression in shown] == [
         ("joy", 0.5, pb.EXPRESSION_SOURCE_FACE)
     ]
 
 
 @pytest.mark.server
-def test_a_robot_that_never_answers_costs_no_decision(server_address: str) -> None:
+async def test_a_robot_that_never_answers_costs_no_decision(server_address: str) -> None:
     robot = ScriptedRobot(lambda act: None)
-
-    async def test() -> list[pb.RecordLine]:
-        async with aio.Client(server_address) as client:
-            # The bank is only for a slow machine: the player does not use it.
-            policy = pb.RoomPolicy(decision_time_ms=1200, bank_ms=3_600_000)
-            made = await client.rooms.create("deaf", seats=[None, "greedy", "greedy", "greedy"], rules=ONE_SHIFT, policy=policy)
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            async with Body(robot, Words("en"), finish_s=0) as body:
-                result = await client.play(RobotPlayer(RandomAgent(7), body), seat.ticket)
-            assert result.finished
-            assert (result.late, result.invalid) == (0, 0)
-            return [line async for line in client.records.read(result.game_id)]
-
-    record = run(test())
+    async with aio.Client(server_address) as client:
+        # The bank is only for a slow machine: the player does not use it.
+        policy = pb.RoomPolicy(decision_time_ms=1200, bank_ms=3_600_000)
+        made = await client.rooms.create("deaf", seats=[None, "greedy", "greedy", "greedy"], rules=ONE_SHIFT, policy=policy)
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        async with Body(robot, Words("en"), finish_s=0) as body:
+            result = await client.play(RobotPlayer(RandomAgent(7), body), seat.ticket)
+        assert result.finished
+        assert (result.late, result.invalid) == (0, 0)
+        record = [line async for line in client.records.read(result.game_id)]
     turns = [line.event.play for line in record if line.event.HasField("play") and line.event.play.seat == 0]
     turns += [
         getattr(line.event, "pass") for line in record if line.event.HasField("pass") and getattr(line.event, "pass").seat == 0
@@ -134,19 +123,15 @@ def test_a_robot_that_never_answers_costs_no_decision(server_address: str) -> No
 
 
 @pytest.mark.server
-def test_a_robot_gives_just_what_the_exchange_says(server_address: str) -> None:
+async def test_a_robot_gives_just_what_the_exchange_says(server_address: str) -> None:
     robot = ScriptedRobot()
-
-    async def test() -> tuple[int, list[pb.RecordLine]]:
-        async with aio.Client(server_address) as client:
-            made = await client.rooms.create("gifts", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=6))
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            result = await play_seat(client, seat.ticket, RandomAgent(5), robot, words=Words("en"))
-            return result.seat, [line async for line in client.records.read(result.game_id)]
-
-    seat, record = run(test())
+    async with aio.Client(server_address) as client:
+        made = await client.rooms.create("gifts", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=6))
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        result = await play_seat(client, seat.ticket, RandomAgent(5), robot, words=Words("en"))
+        record = [line async for line in client.records.read(result.game_id)]
     exchanges = [line.event.cards_exchanged for line in record if line.event.HasField("cards_exchanged")]
-    given = [(exchange.receiver, sorted(exchange.cards)) for exchange in exchanges if exchange.giver == seat]
+    given = [(exchange.receiver, sorted(exchange.cards)) for exchange in exchanges if exchange.giver == result.seat]
     assert given
     spots = [layout.gift_place(receiver, 4) for receiver in range(4)]
     moves = [move for act in robot.acts if isinstance(act, Pick) for move in act.moves if move.end in spots]
@@ -172,7 +157,7 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
             ]
 
     key = ["--name", "Keyed", "--name-key", str(tmp_path / "robot.key")]
-    arguments = ["--address", server_address, "--code", run(code()), "--seed", "3", "--json", "--language", "it", *key]
+    arguments = ["--address", server_address, "--code", asyncio.run(code()), "--seed", "3", "--json", "--language", "it", *key]
     driver = f"simulated:frames={tmp_path / 'frames'},speed=0,clumsy=true"
     assert cli.main(["robot", *arguments, "--driver", driver]) == 0
     out, err = capsys.readouterr()
@@ -184,7 +169,7 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
     frames = sorted((tmp_path / "frames").glob("*.svg"))
     assert len(frames) > 20
     assert any("Passo." in frame.read_text() or "Gioco" in frame.read_text() for frame in frames)
-    assert [len(fingerprint) for fingerprint in run(fingerprints())] == [16]
+    assert [len(fingerprint) for fingerprint in asyncio.run(fingerprints())] == [16]
 
 
 @pytest.mark.parametrize(
@@ -226,7 +211,7 @@ def test_a_robot_that_is_not_there_at_the_start_is_an_error(server_address: str,
         async with aio.Client(server_address) as client:
             return await room(client)
 
-    arguments = ["--address", server_address, "--code", run(code()), "--driver", "jsonlines:port=1"]
+    arguments = ["--address", server_address, "--code", asyncio.run(code()), "--driver", "jsonlines:port=1"]
     assert cli.main(["robot", *arguments]) == 1
     err = capsys.readouterr().err
     assert "no robot listens at 127.0.0.1:1" in err
@@ -314,14 +299,12 @@ class Away(Sender[str]):
         await asyncio.Event().wait()
 
 
-def test_what_cannot_be_sent_at_the_end_is_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+async def test_what_cannot_be_sent_at_the_end_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr("chefshat_robot.running.DRAIN_S", 0.01)
-
-    async def test() -> None:
-        async with aio.Client("127.0.0.1:1") as client, Away(client, "ticket") as sender:
-            sender.send("I pass.")
-
-    run(test())
+    async with aio.Client("127.0.0.1:1") as client, Away(client, "ticket") as sender:
+        sender.send("I pass.")
     assert "was not sent to the server within 0.01 s" in caplog.text
 
 
@@ -336,4 +319,4 @@ def test_a_client_that_is_closed_while_a_room_is_looked_up_says_so() -> None:
 
     # A server that accepts connections and never answers.
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        run(test(f"127.0.0.1:{listener.getsockname()[1]}"))
+        asyncio.run(test(f"127.0.0.1:{listener.getsockname()[1]}"))

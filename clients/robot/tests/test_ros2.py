@@ -31,7 +31,7 @@ from chefshat_robot.drivers.driver import (
 )
 from chefshat_robot.drivers.ros2 import Ros2Driver
 from chefshat_robot.table import TableState, follow
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import game_started, numbered, shift_started
 
 zenoh = pytest.importorskip("zenoh")
@@ -148,123 +148,104 @@ async def pair() -> AsyncIterator[tuple[Ros2Driver, RosRobot]]:
             await asyncio.to_thread(robot.close)
 
 
-def test_acts_are_goals_of_the_action_in_metres_and_radians() -> None:
-    async def test() -> None:
-        async with pair() as (driver, robot):
-            pick = Pick((CardMove("golden", Pose(100.0, 200.0, 90.0), Pose(300.0, 400.0)), CardMove("pass", None, Pose(0.0, 0.0))))
-            for act in (Say("Ciao", "it"), pick, Point(10.0, 20.0), Gaze(10.0, 20.0, 30.0), Express("joy", 0.5, -0.25)):
-                performing = asyncio.create_task(attempt(driver, act, FAR_S))
-                await until(lambda: robot.waits)
-                robot.finish(SUCCEEDED, done=True)
-                assert await performing == Done()
-            say, laid, point, gaze, express = [goal["goal"]["acts"][0] for goal in robot.goals]
-            assert (say["kind"], say["text"], say["language"]) == (1, "Ciao", "it")
-            first, second = laid["moves"]
-            assert (first["piece"], first["start_known"], second["start_known"]) == ("golden", True, False)
-            assert first["start"]["position"] == {"x": 0.1, "y": -0.2, "z": 0.0}
-            assert first["start"]["orientation"]["z"] == pytest.approx(-math.sqrt(0.5))
-            assert first["end"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-            assert point["target"] == {"x": 0.01, "y": -0.02, "z": 0.0}
-            assert (gaze["kind"], gaze["target"]["z"]) == (4, 0.03)
-            assert (express["label"], express["valence"], express["arousal"]) == ("joy", 0.5, -0.25)
-
-    run(test())
-
-
-def test_the_robot_can_fail_refuse_hang_and_leave() -> None:
-    async def test() -> None:
-        async with pair() as (driver, robot):
-            performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
+async def test_acts_are_goals_of_the_action_in_metres_and_radians() -> None:
+    async with pair() as (driver, robot):
+        pick = Pick((CardMove("golden", Pose(100.0, 200.0, 90.0), Pose(300.0, 400.0)), CardMove("pass", None, Pose(0.0, 0.0))))
+        for act in (Say("Ciao", "it"), pick, Point(10.0, 20.0), Gaze(10.0, 20.0, 30.0), Express("joy", 0.5, -0.25)):
+            performing = asyncio.create_task(attempt(driver, act, FAR_S))
             await until(lambda: robot.waits)
-            robot.finish(ABORTED, done=False, reason="no voice")
-            assert await performing == Failed("no voice")
-
-            assert await attempt(driver, Say("two"), 0.3) == Failed("the robot did not finish within 0.3 s")
-            await until(lambda: len(robot.goals) == 2 and robot.cancelled == [robot.goals[1]["goal_id"]["uuid"]])
-            robot.forget_waits()
-
-            robot.accepts = False
-            assert await attempt(driver, Say("three"), FAR_S) == Failed("the robot refused the goal")
-            robot.accepts = True
-
-            performing = asyncio.create_task(attempt(driver, Say("four"), FAR_S))
-            await until(lambda: robot.waits)
-            await asyncio.to_thread(robot.close)
-            outcome = await performing
-            assert isinstance(outcome, Failed)
-            assert "no robot answers at chefshat/play_turn/_action/get_result" in outcome.reason
-
-    run(test())
+            robot.finish(SUCCEEDED, done=True)
+            assert await performing == Done()
+        say, laid, point, gaze, express = [goal["goal"]["acts"][0] for goal in robot.goals]
+        assert (say["kind"], say["text"], say["language"]) == (1, "Ciao", "it")
+        first, second = laid["moves"]
+        assert (first["piece"], first["start_known"], second["start_known"]) == ("golden", True, False)
+        assert first["start"]["position"] == {"x": 0.1, "y": -0.2, "z": 0.0}
+        assert first["start"]["orientation"]["z"] == pytest.approx(-math.sqrt(0.5))
+        assert first["end"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+        assert point["target"] == {"x": 0.01, "y": -0.02, "z": 0.0}
+        assert (gaze["kind"], gaze["target"]["z"]) == (4, 0.03)
+        assert (express["label"], express["valence"], express["arousal"]) == ("joy", 0.5, -0.25)
 
 
-def test_an_act_that_is_not_accepted_in_time_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
-    async def test() -> None:
-        async with pair() as (driver, robot):
-            monkeypatch.setattr(ros2, "ACCEPT_S", 0.3)
-            robot.hesitates = True
-            outcome = await attempt(driver, Say("one"), FAR_S)
-            assert isinstance(outcome, Failed)
-            await until(lambda: robot.goals and robot.cancelled == [robot.goals[0]["goal_id"]["uuid"]])
+async def test_the_robot_can_fail_refuse_hang_and_leave() -> None:
+    async with pair() as (driver, robot):
+        performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
+        await until(lambda: robot.waits)
+        robot.finish(ABORTED, done=False, reason="no voice")
+        assert await performing == Failed("no voice")
 
-    run(test())
+        assert await attempt(driver, Say("two"), 0.3) == Failed("the robot did not finish within 0.3 s")
+        await until(lambda: len(robot.goals) == 2 and robot.cancelled == [robot.goals[1]["goal_id"]["uuid"]])
+        robot.forget_waits()
 
+        robot.accepts = False
+        assert await attempt(driver, Say("three"), FAR_S) == Failed("the robot refused the goal")
+        robot.accepts = True
 
-def test_events_and_states_are_topics_and_the_table_is_a_service() -> None:
-    async def test() -> None:
-        async with pair() as (driver, robot):
-            state = TableState(seat=1)
-            for event in numbered(game_started(), shift_started()):
-                state = follow(state, event)
-                await driver.show_event(event)
-                await driver.show_state(state)
-            await until(lambda: len(robot.heard) == 4)
-            # Topics keep their order, but not among each other.
-            _, dealt = [message for kind, message in robot.heard if kind == "GameEvent"]
-            _, shown = [message for kind, message in robot.heard if kind == "TableState"]
-            assert (dealt["sequence"], dealt["elapsed_ms"], dealt["kind"]) == (2, 200, "shift_started")
-            assert '"golden": true' in dealt["fields"]
-            hand = [0, 2, 0, 0, 1, 0, 1, 0, 3, 3, 5, 2]
-            assert (shown["seat"], shown["hand"], shown["golden"], shown["to_act"]) == (1, hand, True, -1)
-            replies = await asyncio.to_thread(
-                lambda: list(robot.session.get("chefshat/get_table", payload=robot.cdr.encode("GetTable_Request", {})))
-            )
-            table = robot.cdr.decode("GetTable_Response", bytes(replies[0].ok.payload))["state"]
-            assert table == shown
-            assert table["names"] == ["Ada", "Pepe", "Cleo", "Dan"]
-
-    run(test())
+        performing = asyncio.create_task(attempt(driver, Say("four"), FAR_S))
+        await until(lambda: robot.waits)
+        await asyncio.to_thread(robot.close)
+        outcome = await performing
+        assert isinstance(outcome, Failed)
+        assert "no robot answers at chefshat/play_turn/_action/get_result" in outcome.reason
 
 
-def test_what_the_robot_perceives_is_a_topic(caplog: pytest.LogCaptureFixture) -> None:
+async def test_an_act_that_is_not_accepted_in_time_is_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with pair() as (driver, robot):
+        monkeypatch.setattr(ros2, "ACCEPT_S", 0.3)
+        robot.hesitates = True
+        outcome = await attempt(driver, Say("one"), FAR_S)
+        assert isinstance(outcome, Failed)
+        await until(lambda: robot.goals and robot.cancelled == [robot.goals[0]["goal_id"]["uuid"]])
+
+
+async def test_events_and_states_are_topics_and_the_table_is_a_service() -> None:
+    async with pair() as (driver, robot):
+        state = TableState(seat=1)
+        for event in numbered(game_started(), shift_started()):
+            state = follow(state, event)
+            await driver.show_event(event)
+            await driver.show_state(state)
+        await until(lambda: len(robot.heard) == 4)
+        # Topics keep their order, but not among each other.
+        _, dealt = [message for kind, message in robot.heard if kind == "GameEvent"]
+        _, shown = [message for kind, message in robot.heard if kind == "TableState"]
+        assert (dealt["sequence"], dealt["elapsed_ms"], dealt["kind"]) == (2, 200, "shift_started")
+        assert '"golden": true' in dealt["fields"]
+        hand = [0, 2, 0, 0, 1, 0, 1, 0, 3, 3, 5, 2]
+        assert (shown["seat"], shown["hand"], shown["golden"], shown["to_act"]) == (1, hand, True, -1)
+        replies = await asyncio.to_thread(
+            lambda: list(robot.session.get("chefshat/get_table", payload=robot.cdr.encode("GetTable_Request", {})))
+        )
+        table = robot.cdr.decode("GetTable_Response", bytes(replies[0].ok.payload))["state"]
+        assert table == shown
+        assert table["names"] == ["Ada", "Pepe", "Cleo", "Dan"]
+
+
+async def test_what_the_robot_perceives_is_a_topic(caplog: pytest.LogCaptureFixture) -> None:
     unknown = {"text": "", "name": "", "label": "", "source": "", "seat": -1}
     unknown |= dict.fromkeys(("valence", "arousal", "dominance", "confidence"), math.nan)
-
-    async def test() -> None:
-        async with pair() as (driver, robot):
-            events = driver.events()
-            robot.session.put("chefshat/robot_event", b"nonsense")
-            for message in (
-                {"kind": "heard", "text": "ciao", "confidence": 0.5},
-                {"kind": "affect", "label": "joy", "valence": 0.25, "source": "face", "seat": 2},
-            ):
-                robot.session.put("chefshat/robot_event", robot.cdr.encode("RobotEvent", {**unknown, **message}))
-            assert await anext(events) == Heard("ciao", 0.5)
-            assert await anext(events) == Affect("joy", valence=0.25, source="face", seat=2)
-
-    run(test())
+    async with pair() as (driver, robot):
+        events = driver.events()
+        robot.session.put("chefshat/robot_event", b"nonsense")
+        for message in (
+            {"kind": "heard", "text": "ciao", "confidence": 0.5},
+            {"kind": "affect", "label": "joy", "valence": 0.25, "source": "face", "seat": 2},
+        ):
+            robot.session.put("chefshat/robot_event", robot.cdr.encode("RobotEvent", {**unknown, **message}))
+        assert await anext(events) == Heard("ciao", 0.5)
+        assert await anext(events) == Affect("joy", valence=0.25, source="face", seat=2)
     assert "are not a message RobotEvent" in caplog.text
 
 
-def test_a_robot_that_is_not_there_is_an_error_that_says_what_to_do() -> None:
-    async def test() -> None:
-        async with Ros2Driver(listen=f"tcp/127.0.0.1:{free_port()}", multicast=False) as driver:
-            outcome = await attempt(driver, Say("anyone?"), FAR_S)
-            assert isinstance(outcome, Failed)
-            assert "start its node and the bridge" in outcome.reason
-        with pytest.raises(RobotError, match="no Zenoh session"):
-            await Ros2Driver(connect="carrier-pigeon/7447", multicast=False).connect()
-
-    run(test())
+async def test_a_robot_that_is_not_there_is_an_error_that_says_what_to_do() -> None:
+    async with Ros2Driver(listen=f"tcp/127.0.0.1:{free_port()}", multicast=False) as driver:
+        outcome = await attempt(driver, Say("anyone?"), FAR_S)
+        assert isinstance(outcome, Failed)
+        assert "start its node and the bridge" in outcome.reason
+    with pytest.raises(RobotError, match="no Zenoh session"):
+        await Ros2Driver(connect="carrier-pigeon/7447", multicast=False).connect()
 
 
 def test_cdr_is_that_of_ros_2() -> None:

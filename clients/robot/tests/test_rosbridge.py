@@ -13,7 +13,7 @@ import pytest
 from chefshat_robot.drivers.driver import Button, CardMove, Done, Failed, Pick, Pose, RobotError, Say, attempt
 from chefshat_robot.drivers.rosbridge import RosbridgeDriver
 from chefshat_robot.table import TableState, follow
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import game_started, numbered, shift_started
 
 pytest.importorskip("roslibpy")
@@ -75,91 +75,78 @@ async def pair() -> AsyncIterator[tuple[RosbridgeDriver, Rosbridge]]:
             yield driver, bridge
 
 
-def test_everything_is_declared_with_its_type() -> None:
-    async def test() -> None:
-        async with pair() as (_, bridge):
-            (service,) = bridge.of("advertise_service")
-            assert (service["service"], service["type"]) == ("/chefshat/get_table", "chefshat_msgs/srv/GetTable")
-            advertised = {message["topic"]: message["type"] for message in bridge.of("advertise")}
-            types = "chefshat_msgs/msg"
-            assert advertised == {"/chefshat/event": f"{types}/GameEvent", "/chefshat/state": f"{types}/TableState"}
-            (subscribed,) = bridge.of("subscribe")
-            assert (subscribed["topic"], subscribed["type"]) == ("/chefshat/robot_event", "chefshat_msgs/msg/RobotEvent")
-
-    run(test())
+async def test_everything_is_declared_with_its_type() -> None:
+    async with pair() as (_, bridge):
+        (service,) = bridge.of("advertise_service")
+        assert (service["service"], service["type"]) == ("/chefshat/get_table", "chefshat_msgs/srv/GetTable")
+        advertised = {message["topic"]: message["type"] for message in bridge.of("advertise")}
+        types = "chefshat_msgs/msg"
+        assert advertised == {"/chefshat/event": f"{types}/GameEvent", "/chefshat/state": f"{types}/TableState"}
+        (subscribed,) = bridge.of("subscribe")
+        assert (subscribed["topic"], subscribed["type"]) == ("/chefshat/robot_event", "chefshat_msgs/msg/RobotEvent")
 
 
-def test_acts_are_goals_and_can_succeed_fail_hang_and_be_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_acts_are_goals_and_can_succeed_fail_hang_and_be_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chefshat_robot.drivers.rosbridge.CONNECT_S", FAR_S)
+    async with pair() as (driver, bridge):
+        performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
+        goal = await bridge.goal("one")
+        assert (goal["action"], goal["action_type"]) == ("/chefshat/play_turn", "chefshat_msgs/action/PlayTurn")
+        await bridge.send(op="action_feedback", id=goal["id"], action=goal["action"], values={"act": 0})
+        await bridge.finish(goal, SUCCEEDED, {"done": True, "performed": 1, "reason": ""})
+        assert await performing == Done()
 
-    async def test() -> None:
-        async with pair() as (driver, bridge):
-            performing = asyncio.create_task(attempt(driver, Say("one"), FAR_S))
-            goal = await bridge.goal("one")
-            assert (goal["action"], goal["action_type"]) == ("/chefshat/play_turn", "chefshat_msgs/action/PlayTurn")
-            await bridge.send(op="action_feedback", id=goal["id"], action=goal["action"], values={"act": 0})
-            await bridge.finish(goal, SUCCEEDED, {"done": True, "performed": 1, "reason": ""})
-            assert await performing == Done()
+        for text, values, result in (("two", {"done": False, "reason": "no voice"}, True), ("three", "no voice", False)):
+            performing = asyncio.create_task(attempt(driver, Say(text), FAR_S))
+            await bridge.finish(await bridge.goal(text), ABORTED, values, result=result)
+            assert await performing == Failed("no voice")
 
-            for text, values, result in (("two", {"done": False, "reason": "no voice"}, True), ("three", "no voice", False)):
-                performing = asyncio.create_task(attempt(driver, Say(text), FAR_S))
-                await bridge.finish(await bridge.goal(text), ABORTED, values, result=result)
-                assert await performing == Failed("no voice")
+        assert await attempt(driver, Say("four"), 0.2) == Failed("the robot did not finish within 0.2 s")
+        goal = await bridge.goal("four")
+        cancelled = await bridge.find(lambda message: message["op"] == "cancel_action_goal")
+        assert cancelled["id"] == goal["id"]
+        await bridge.finish(goal, CANCELED, {"done": False, "reason": "cancelled"})  # Nobody waits for it.
 
-            assert await attempt(driver, Say("four"), 0.2) == Failed("the robot did not finish within 0.2 s")
-            goal = await bridge.goal("four")
-            cancelled = await bridge.find(lambda message: message["op"] == "cancel_action_goal")
-            assert cancelled["id"] == goal["id"]
-            await bridge.finish(goal, CANCELED, {"done": False, "reason": "cancelled"})  # Nobody waits for it.
+        performing = asyncio.create_task(attempt(driver, Say("five"), FAR_S))
+        await bridge.goal("five")
+        await bridge.hang_up()
+        assert await performing == Failed("the connection to rosbridge was lost")
 
-            performing = asyncio.create_task(attempt(driver, Say("five"), FAR_S))
-            await bridge.goal("five")
-            await bridge.hang_up()
-            assert await performing == Failed("the connection to rosbridge was lost")
-
-            pick = Pick((CardMove("9", Pose(0.0, 0.0), Pose(0.0, 0.0)),))
-            performing = asyncio.create_task(attempt(driver, pick, FAR_S))
-            goal = await bridge.goal("")
-            assert goal["args"]["acts"][0]["moves"][0]["piece"] == "9"
-            await bridge.finish(goal, SUCCEEDED, {"done": True})
-            assert await performing == Done()
-            assert bridge.connections == 2
-
-    run(test())
+        pick = Pick((CardMove("9", Pose(0.0, 0.0), Pose(0.0, 0.0)),))
+        performing = asyncio.create_task(attempt(driver, pick, FAR_S))
+        goal = await bridge.goal("")
+        assert goal["args"]["acts"][0]["moves"][0]["piece"] == "9"
+        await bridge.finish(goal, SUCCEEDED, {"done": True})
+        assert await performing == Done()
+        assert bridge.connections == 2
 
 
-def test_events_states_and_the_table_are_served_and_the_robot_is_heard(caplog: pytest.LogCaptureFixture) -> None:
-    async def test() -> None:
-        async with pair() as (driver, bridge):
-            state = TableState(seat=1)
-            for event in numbered(game_started(), shift_started()):
-                state = follow(state, event)
-                await driver.show_event(event)
-            await driver.show_state(state)
-            shown = await bridge.find(lambda message: message["op"] == "publish" and message["topic"] == "/chefshat/state")
-            assert (shown["msg"]["seat"], shown["msg"]["hand"][10]) == (1, 5)
-            events = [message["msg"] for message in bridge.of("publish") if message["topic"] == "/chefshat/event"]
-            assert [event["kind"] for event in events] == ["game_started", "shift_started"]
+async def test_events_states_and_the_table_are_served_and_the_robot_is_heard(caplog: pytest.LogCaptureFixture) -> None:
+    async with pair() as (driver, bridge):
+        state = TableState(seat=1)
+        for event in numbered(game_started(), shift_started()):
+            state = follow(state, event)
+            await driver.show_event(event)
+        await driver.show_state(state)
+        shown = await bridge.find(lambda message: message["op"] == "publish" and message["topic"] == "/chefshat/state")
+        assert (shown["msg"]["seat"], shown["msg"]["hand"][10]) == (1, 5)
+        events = [message["msg"] for message in bridge.of("publish") if message["topic"] == "/chefshat/event"]
+        assert [event["kind"] for event in events] == ["game_started", "shift_started"]
 
-            await bridge.send(op="call_service", id="q1", service="/chefshat/get_table", args={})
-            reply = await bridge.find(lambda message: message["op"] == "service_response")
-            assert (reply["id"], reply["result"], reply["values"]["state"]) == ("q1", True, shown["msg"])
+        await bridge.send(op="call_service", id="q1", service="/chefshat/get_table", args={})
+        reply = await bridge.find(lambda message: message["op"] == "service_response")
+        assert (reply["id"], reply["result"], reply["values"]["state"]) == ("q1", True, shown["msg"])
 
-            bad = {"kind": "affect", "label": "joy", "valence": 7.0, "arousal": None, "dominance": None, "confidence": None}
-            good = {"kind": "button", "name": "chest", "text": "", "label": "", "source": "", "seat": -1}
-            for message in (bad, good):
-                await bridge.send(op="publish", topic="/chefshat/robot_event", msg=message)
-            assert await anext(driver.events()) == Button("chest")
-
-    run(test())
+        bad = {"kind": "affect", "label": "joy", "valence": 7.0, "arousal": None, "dominance": None, "confidence": None}
+        good = {"kind": "button", "name": "chest", "text": "", "label": "", "source": "", "seat": -1}
+        for message in (bad, good):
+            await bridge.send(op="publish", topic="/chefshat/robot_event", msg=message)
+        assert await anext(driver.events()) == Button("chest")
     assert "`valence` is 7.0" in caplog.text
 
 
-def test_a_bridge_that_is_not_there_is_an_error_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_bridge_that_is_not_there_is_an_error_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chefshat_robot.drivers.rosbridge.CONNECT_S", 0.2)
 
-    async def test() -> None:
-        with pytest.raises(RobotError, match=r"no rosbridge answers at 127\.0\.0\.1:1: start it"):
-            await RosbridgeDriver(port=1).connect()
-
-    run(test())
+    with pytest.raises(RobotError, match=r"no rosbridge answers at 127\.0\.0\.1:1: start it"):
+        await RosbridgeDriver(port=1).connect()

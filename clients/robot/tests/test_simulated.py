@@ -15,7 +15,6 @@ from chefshat_robot.drivers.driver import CardMove, Done, Express, Failed, Gaze,
 from chefshat_robot.drivers.simulated import SimulatedDriver
 from chefshat_robot.drivers.standpoint import Standpoint, mood_of
 from chefshat_robot.table import TableState, follow
-from tests.loop import run
 from tests.robots import game_started, numbered, passed, play, shift_started
 
 FAR_S = 3600.0
@@ -27,25 +26,22 @@ def texts(path: Path) -> list[str]:
     return ["".join(text.itertext()) for text in ElementTree.parse(path).iter(f"{SVG}text")]
 
 
-def test_every_act_is_drawn(tmp_path: Path) -> None:
-    async def test() -> None:
-        async with SimulatedDriver(frames=tmp_path, speed=0) as driver:
-            state = TableState(seat=1)
-            for event in numbered(game_started(), shift_started(), play(0, 11, 1), passed(3)):
-                state = follow(state, event)
-                await driver.show_state(state)
-            before = driver.frames_written
-            stand = layout.Stand.at(1, 4)
-            stand.fill(state.hand, state.golden)
-            moves = stand.take(["9", "9"], layout.play_places(2))
-            acts = (Say("Tom & <Jerry>"), Pick(moves), Point(280.0, 200.0), Gaze(0.0, 0.0), Express("gloom", -0.8, -0.5))
-            for act in acts:
-                assert await attempt(driver, act, FAR_S) == Done()
-            # Two pictures for each card: at its start and at its end.
-            assert driver.frames_written == before + len(acts) + 3
-            assert driver.acts == list(acts)
-
-    run(test())
+async def test_every_act_is_drawn(tmp_path: Path) -> None:
+    async with SimulatedDriver(frames=tmp_path, speed=0) as driver:
+        state = TableState(seat=1)
+        for event in numbered(game_started(), shift_started(), play(0, 11, 1), passed(3)):
+            state = follow(state, event)
+            await driver.show_state(state)
+        before = driver.frames_written
+        stand = layout.Stand.at(1, 4)
+        stand.fill(state.hand, state.golden)
+        moves = stand.take(["9", "9"], layout.play_places(2))
+        acts = (Say("Tom & <Jerry>"), Pick(moves), Point(280.0, 200.0), Gaze(0.0, 0.0), Express("gloom", -0.8, -0.5))
+        for act in acts:
+            assert await attempt(driver, act, FAR_S) == Done()
+        # Two pictures for each card: at its start and at its end.
+        assert driver.frames_written == before + len(acts) + 3
+        assert driver.acts == list(acts)
     frames = [texts(path) for path in sorted(tmp_path.glob("*.svg"))]
     said = next(frame for frame in frames if "Tom & <Jerry>" in frame)
     assert "9" in said
@@ -55,24 +51,17 @@ def test_every_act_is_drawn(tmp_path: Path) -> None:
     assert frames[-1].count("9") == said.count("9")
 
 
-def test_a_clumsy_robot_drops_its_cards(tmp_path: Path) -> None:
-    async def test() -> None:
-        async with SimulatedDriver(speed=0, clumsy=True) as driver:
-            pick = Pick((CardMove("9", None, Pose(0.0, 0.0)),))
-            assert await attempt(driver, pick, FAR_S) == Failed("the gripper dropped the card")
-
-    run(test())
+async def test_a_clumsy_robot_drops_its_cards(tmp_path: Path) -> None:
+    async with SimulatedDriver(speed=0, clumsy=True) as driver:
+        pick = Pick((CardMove("9", None, Pose(0.0, 0.0)),))
+        assert await attempt(driver, pick, FAR_S) == Failed("the gripper dropped the card")
 
 
-def test_pictures_are_rendered_as_png(tmp_path: Path) -> None:
+async def test_pictures_are_rendered_as_png(tmp_path: Path) -> None:
     pytest.importorskip("resvg_py")
     image = pytest.importorskip("PIL.Image")
-
-    async def test() -> None:
-        async with SimulatedDriver(frames=tmp_path, png=True, speed=0) as driver:
-            await attempt(driver, Say("Hello"), FAR_S)
-
-    run(test())
+    async with SimulatedDriver(frames=tmp_path, png=True, speed=0) as driver:
+        await attempt(driver, Say("Hello"), FAR_S)
     pictures = sorted(tmp_path.glob("*.png"))
     assert len(pictures) == 2
     silent, speaking = [image.open(io.BytesIO(path.read_bytes())).convert("RGB") for path in pictures]
@@ -102,10 +91,10 @@ def test_every_seat_and_number_of_players_can_be_drawn() -> None:
             ElementTree.fromstring(picture.draw(scene))
 
 
-def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
+async def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="file"):
-        run(SimulatedDriver(frames=tmp_path / "file" / "frames").connect())
+        await SimulatedDriver(frames=tmp_path / "file" / "frames").connect()
 
 
 def test_a_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,6 @@ from chefshat import Decision, aio, pb
 from chefshat_robot import cli
 from chefshat_robot.affect import Forwarder, expression_of, forward_stream, serve_lines, stream_affects
 from chefshat_robot.drivers.driver import Affect, RobotError
-from tests.loop import run
 
 pylsl = pytest.importorskip("pylsl")
 ONE_SHIFT = pb.RuleSet(target_shifts=1)
@@ -63,93 +62,81 @@ class Game:
 
 
 @pytest.mark.server
-def test_lines_of_an_analyser_become_expressions_of_the_seat(server_address: str) -> None:
-    async def test() -> list[pb.RecordLine]:
-        async with aio.Client(server_address) as client:
-            async with Game(client) as game:
-                ports: asyncio.Queue[int] = asyncio.Queue()
-                forwarder = Forwarder(client, {0: game.ticket}, interval_s=0)
-                serving = asyncio.create_task(serve_lines(forwarder, "127.0.0.1", 0, ready=ports.put_nowait))
-                reader, writer = await asyncio.open_connection("127.0.0.1", await ports.get())
-                good = {"label": "joy", "valence": 0.5, "confidence": 0.75, "source": "face", "seat": 0, "taken_at": 1763712000.5}
-                lines: list[object] = [good, {"label": "joy", "seat": 3}, {"label": "joy"}, [], {"label": "joy", "valence": -3}]
-                for line in lines:
-                    writer.write(json.dumps(line).encode() + b"\n")
-                answers = [json.loads(await reader.readline())["error"] for _ in range(4)]
-                shown = (await game.agent.seen.get()).expression
-                assert (shown.label, shown.valence, shown.confidence) == ("joy", 0.5, 0.75)
-                assert shown.source == pb.EXPRESSION_SOURCE_FACE
-                assert shown.taken_at.ToNanoseconds() == 1763712000_500_000_000
-                assert not shown.HasField("arousal")
-                assert "no ticket for seat 3" in answers[0]
-                assert "no ticket for a reading without `seat`" in answers[1]
-                assert "must be a JSON object" in answers[2]
-                assert "`valence` is -3" in answers[3]
-                writer.close()
-                serving.cancel()
-            return [line async for line in client.records.read(game.game_id)]
-
-    record = run(test())
+async def test_lines_of_an_analyser_become_expressions_of_the_seat(server_address: str) -> None:
+    async with aio.Client(server_address) as client:
+        async with Game(client) as game:
+            ports: asyncio.Queue[int] = asyncio.Queue()
+            forwarder = Forwarder(client, {0: game.ticket}, interval_s=0)
+            serving = asyncio.create_task(serve_lines(forwarder, "127.0.0.1", 0, ready=ports.put_nowait))
+            reader, writer = await asyncio.open_connection("127.0.0.1", await ports.get())
+            good = {"label": "joy", "valence": 0.5, "confidence": 0.75, "source": "face", "seat": 0, "taken_at": 1763712000.5}
+            lines: list[object] = [good, {"label": "joy", "seat": 3}, {"label": "joy"}, [], {"label": "joy", "valence": -3}]
+            for line in lines:
+                writer.write(json.dumps(line).encode() + b"\n")
+            answers = [json.loads(await reader.readline())["error"] for _ in range(4)]
+            shown = (await game.agent.seen.get()).expression
+            assert (shown.label, shown.valence, shown.confidence) == ("joy", 0.5, 0.75)
+            assert shown.source == pb.EXPRESSION_SOURCE_FACE
+            assert shown.taken_at.ToNanoseconds() == 1763712000_500_000_000
+            assert not shown.HasField("arousal")
+            assert "no ticket for seat 3" in answers[0]
+            assert "no ticket for a reading without `seat`" in answers[1]
+            assert "must be a JSON object" in answers[2]
+            assert "`valence` is -3" in answers[3]
+            writer.close()
+            serving.cancel()
+        record = [line async for line in client.records.read(game.game_id)]
     assert [line.event.expression_shown.expression.label for line in record if line.event.HasField("expression_shown")] == ["joy"]
 
 
 @pytest.mark.server
-def test_streams_of_text_and_of_numbers_become_expressions(server_address: str) -> None:
-    async def test() -> None:
-        async with aio.Client(server_address) as client, Game(client) as game:
-            forwarder = Forwarder(client, {None: game.ticket}, interval_s=0)
-            texts, numbers = uuid.uuid4().hex, uuid.uuid4().hex
-            text_outlet = pylsl.StreamOutlet(pylsl.StreamInfo("Faces", "Affect", 1, 0, pylsl.cf_string, texts))
-            info = pylsl.StreamInfo("tension", "Affect", 2, 0, pylsl.cf_float32, numbers)
-            info.set_channel_labels(["arousal", "pupil"])
-            number_outlet = pylsl.StreamOutlet(info)
-            streams = [asyncio.create_task(forward_stream(forwarder, "source_id", source)) for source in (texts, numbers)]
-            for outlet in (text_outlet, number_outlet):
-                assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
-            text_outlet.push_sample(["nonsense"])
-            text_outlet.push_sample([json.dumps({"label": "joy", "source": "voice"})])
-            voice = (await game.agent.seen.get()).expression
-            assert (voice.label, voice.source) == ("joy", pb.EXPRESSION_SOURCE_VOICE)
-            assert voice.HasField("taken_at")
-            number_outlet.push_sample([0.5, 3.0])
-            tension = (await game.agent.seen.get()).expression
-            assert (tension.label, tension.arousal, tension.HasField("valence")) == ("tension", 0.5, False)
-            for stream in streams:
-                stream.cancel()
-            await asyncio.gather(*streams, return_exceptions=True)
-
-    run(test())
+async def test_streams_of_text_and_of_numbers_become_expressions(server_address: str) -> None:
+    async with aio.Client(server_address) as client, Game(client) as game:
+        forwarder = Forwarder(client, {None: game.ticket}, interval_s=0)
+        texts, numbers = uuid.uuid4().hex, uuid.uuid4().hex
+        text_outlet = pylsl.StreamOutlet(pylsl.StreamInfo("Faces", "Affect", 1, 0, pylsl.cf_string, texts))
+        info = pylsl.StreamInfo("tension", "Affect", 2, 0, pylsl.cf_float32, numbers)
+        info.set_channel_labels(["arousal", "pupil"])
+        number_outlet = pylsl.StreamOutlet(info)
+        streams = [asyncio.create_task(forward_stream(forwarder, "source_id", source)) for source in (texts, numbers)]
+        for outlet in (text_outlet, number_outlet):
+            assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
+        text_outlet.push_sample(["nonsense"])
+        text_outlet.push_sample([json.dumps({"label": "joy", "source": "voice"})])
+        voice = (await game.agent.seen.get()).expression
+        assert (voice.label, voice.source) == ("joy", pb.EXPRESSION_SOURCE_VOICE)
+        assert voice.HasField("taken_at")
+        number_outlet.push_sample([0.5, 3.0])
+        tension = (await game.agent.seen.get()).expression
+        assert (tension.label, tension.arousal, tension.HasField("valence")) == ("tension", 0.5, False)
+        for stream in streams:
+            stream.cancel()
+        await asyncio.gather(*streams, return_exceptions=True)
 
 
-def test_what_an_analyser_does_not_know_is_left_out(caplog: pytest.LogCaptureFixture) -> None:
-    async def test() -> Affect:
-        source = uuid.uuid4().hex
-        info = pylsl.StreamInfo("tension", "Affect", 3, 0, pylsl.cf_float32, source)
-        info.set_channel_labels(["valence", "arousal", "pupil"])
-        outlet = pylsl.StreamOutlet(info)
-        reading = asyncio.ensure_future(anext(stream_affects("source_id", source)))
-        assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
-        outlet.push_sample([math.nan, math.nan, 3.0])
-        outlet.push_sample([0.5, math.nan, 3.0])
-        return await reading
-
-    affect = run(test())
+async def test_what_an_analyser_does_not_know_is_left_out(caplog: pytest.LogCaptureFixture) -> None:
+    source = uuid.uuid4().hex
+    info = pylsl.StreamInfo("tension", "Affect", 3, 0, pylsl.cf_float32, source)
+    info.set_channel_labels(["valence", "arousal", "pupil"])
+    outlet = pylsl.StreamOutlet(info)
+    reading = asyncio.ensure_future(anext(stream_affects("source_id", source)))
+    assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
+    outlet.push_sample([math.nan, math.nan, 3.0])
+    outlet.push_sample([0.5, math.nan, 3.0])
+    affect = await reading
     assert (affect.label, affect.valence, affect.arousal) == ("tension", 0.5, None)
     assert "ignored a sample" not in caplog.text
 
 
-def test_a_stream_without_the_channels_is_refused() -> None:
-    async def test() -> None:
-        source = uuid.uuid4().hex
-        outlet = pylsl.StreamOutlet(pylsl.StreamInfo("EEG", "EEG", 2, 0, pylsl.cf_float32, source))
-        with pytest.raises(RobotError, match="it needs labels among valence, arousal"):
-            await anext(stream_affects("source_id", source))
-        del outlet
-
-    run(test())
+async def test_a_stream_without_the_channels_is_refused() -> None:
+    source = uuid.uuid4().hex
+    outlet = pylsl.StreamOutlet(pylsl.StreamInfo("EEG", "EEG", 2, 0, pylsl.cf_float32, source))
+    with pytest.raises(RobotError, match="it needs labels among valence, arousal"):
+        await anext(stream_affects("source_id", source))
+    del outlet
 
 
-def test_readings_that_follow_too_soon_are_dropped() -> None:
+async def test_readings_that_follow_too_soon_are_dropped() -> None:
     class Server:
         def __init__(self) -> None:
             self.got: list[tuple[str, str]] = []
@@ -157,15 +144,12 @@ def test_readings_that_follow_too_soon_are_dropped() -> None:
         async def send_expression(self, ticket: str, expression: pb.Expression) -> None:
             self.got.append((ticket, expression.label))
 
-    async def test() -> None:
-        server = Server()
-        client: Any = server
-        forwarder = Forwarder(client, {0: "a", 1: "b"}, interval_s=FAR_S)
-        for label, seat in (("joy", 0), ("anger", 0), ("joy", 1), ("fear", 1)):
-            await forwarder.forward(Affect(label, seat=seat))
-        assert server.got == [("a", "joy"), ("b", "joy")]
-
-    run(test())
+    server = Server()
+    client: Any = server
+    forwarder = Forwarder(client, {0: "a", 1: "b"}, interval_s=FAR_S)
+    for label, seat in (("joy", 0), ("anger", 0), ("joy", 1), ("fear", 1)):
+        await forwarder.forward(Affect(label, seat=seat))
+    assert server.got == [("a", "joy"), ("b", "joy")]
 
 
 def test_readings_are_complete_expressions() -> None:

@@ -12,7 +12,7 @@ from chefshat_robot import cli, speech
 from chefshat_robot.drivers.driver import Express, Pick, Say
 from chefshat_robot.wizard import follow_seat
 from chefshat_robot.words import Words
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import ScriptedRobot
 
 ONE_SHIFT = pb.RuleSet(target_shifts=1)
@@ -37,25 +37,21 @@ class Wizard(chefshat.Agent):
 
 
 @pytest.mark.server
-def test_the_robot_says_lays_and_shows_what_the_wizard_sends(server_address: str) -> None:
+async def test_the_robot_says_lays_and_shows_what_the_wizard_sends(server_address: str) -> None:
     robot = ScriptedRobot()
-
-    async def test() -> list[pb.RecordLine]:
-        async with aio.Client(server_address) as client:
-            made = await client.rooms.create("oz", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
-            wizard = Wizard(client)
-            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
-            wizard.ticket = seat.ticket
-            room = made.room.room_id
-            playing = asyncio.create_task(client.play(wizard, seat.ticket))
-            following = asyncio.create_task(follow_seat(client, room, seat.seat, robot, words=Words("it")))
-            await until(lambda: robot.seen)
-            wizard.start.set()
-            result = await playing
-            await following
-            return [line async for line in client.records.read(result.game_id)]
-
-    record = run(test())
+    async with aio.Client(server_address) as client:
+        made = await client.rooms.create("oz", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
+        wizard = Wizard(client)
+        seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+        wizard.ticket = seat.ticket
+        room = made.room.room_id
+        playing = asyncio.create_task(client.play(wizard, seat.ticket))
+        following = asyncio.create_task(follow_seat(client, room, seat.seat, robot, words=Words("it")))
+        await until(lambda: robot.seen)
+        wizard.start.set()
+        result = await playing
+        await following
+        record = [line async for line in client.records.read(result.game_id)]
     said = [act.text for act in robot.acts if isinstance(act, Say)]
     assert "Che bella pizza!" in said
     assert Express("joy", 0.75, 0.5) in robot.acts
@@ -71,33 +67,28 @@ def test_the_robot_says_lays_and_shows_what_the_wizard_sends(server_address: str
 
 
 @pytest.mark.server
-def test_a_built_in_agent_has_a_body_and_the_past_is_not_performed(server_address: str) -> None:
+async def test_a_built_in_agent_has_a_body_and_the_past_is_not_performed(server_address: str) -> None:
     robot = ScriptedRobot()
-
-    async def test() -> int:
-        async with aio.Client(server_address) as client:
-            made = await client.rooms.create("past", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=2))
-            person = Wizard(client)
-            person.said = True
-            seat = await client.rooms.join(made.join_code, "Ada")
-            playing = asyncio.create_task(client.play(person, seat.ticket))
-            room = made.room.room_id
-            past: list[pb.GameEvent] = []
-            async for event in client.rooms.watch(room):
-                past.append(event)
-                if event.HasField("shift_started"):
-                    break
-            following = asyncio.create_task(
-                follow_seat(client, room, 1, robot, words=Words("en"), announces=False, handles_cards=False)
-            )
-            await until(lambda: robot.seen)
-            person.start.set()
-            await playing
-            await following
-            return past[-1].sequence
-
-    past = run(test())
-    assert robot.seen[0].sequence == 1 <= past
+    async with aio.Client(server_address) as client:
+        made = await client.rooms.create("past", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=2))
+        person = Wizard(client)
+        person.said = True
+        seat = await client.rooms.join(made.join_code, "Ada")
+        playing = asyncio.create_task(client.play(person, seat.ticket))
+        room = made.room.room_id
+        past: list[pb.GameEvent] = []
+        async for event in client.rooms.watch(room):
+            past.append(event)
+            if event.HasField("shift_started"):
+                break
+        following = asyncio.create_task(
+            follow_seat(client, room, 1, robot, words=Words("en"), announces=False, handles_cards=False)
+        )
+        await until(lambda: robot.seen)
+        person.start.set()
+        await playing
+        await following
+    assert robot.seen[0].sequence == 1 <= past[-1].sequence
     # It neither speaks nor carries: it only looks at who is to act.
     assert robot.acts
     assert not any(isinstance(act, Say | Pick | Express) for act in robot.acts)

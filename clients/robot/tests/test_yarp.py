@@ -28,7 +28,7 @@ from chefshat_robot.drivers.driver import (
     attempt,
 )
 from chefshat_robot.drivers.yarp import YarpDriver
-from tests.loop import run, until
+from tests.loop import until
 from tests.robots import game_started, numbered
 
 FAR_S = 3600.0
@@ -98,7 +98,7 @@ async def pair() -> AsyncIterator[tuple[YarpDriver, Icub]]:
             listening.close()
 
 
-def test_acts_are_bottles_with_replies() -> None:
+async def test_acts_are_bottles_with_replies() -> None:
     pick = Pick((CardMove("9", Pose(230.0, 530.0), Pose(97.5, 151.0, 90.0)), CardMove("pass", None, Pose(1.0, 2.0))))
     acts: dict[str, Act] = {
         r'say "Allora: \"Passo\".\nSì" "it"': Say('Allora: "Passo".\nSì', "it"),
@@ -107,108 +107,93 @@ def test_acts_are_bottles_with_replies() -> None:
         "gaze 1.0 2.0 3.0": Gaze(1.0, 2.0, 3.0),
         'express "joy" 0.5 -0.5': Express("joy", 0.5, -0.5),
     }
-
-    async def test() -> None:
-        async with pair() as (driver, icub):
-            for act in acts.values():
-                assert await attempt(driver, act, FAR_S) == Done()
-            assert icub.got == [("d", text) for text in acts]
-            for event in numbered(game_started()):
-                await driver.show_event(event)
-            await until(lambda: len(icub.got) == len(acts) + 1)
-            command, event_text = icub.got[-1]
-            assert command == "do"
-            assert bottle.parse(event_text)[:4] == ["event", 1, 100, "game_started"]
-
-    run(test())
+    async with pair() as (driver, icub):
+        for act in acts.values():
+            assert await attempt(driver, act, FAR_S) == Done()
+        assert icub.got == [("d", text) for text in acts]
+        for event in numbered(game_started()):
+            await driver.show_event(event)
+        await until(lambda: len(icub.got) == len(acts) + 1)
+        command, event_text = icub.got[-1]
+        assert command == "do"
+        assert bottle.parse(event_text)[:4] == ["event", 1, 100, "game_started"]
 
 
-def test_the_robot_can_fail_hang_and_come_back_and_late_replies_are_not_mixed_up() -> None:
-    async def test() -> None:
-        async with pair() as (driver, icub):
-            for reply, reason in (
-                ('failed "no voice"', "no voice"),
-                ("[fail] tired", "tired"),
-                ("[nack]", 'the robot replied "nack"'),
-            ):
-                icub.reply = reply
-                assert await attempt(driver, Say("one"), FAR_S) == Failed(reason)
+async def test_the_robot_can_fail_hang_and_come_back_and_late_replies_are_not_mixed_up() -> None:
+    async with pair() as (driver, icub):
+        for reply, reason in (
+            ('failed "no voice"', "no voice"),
+            ("[fail] tired", "tired"),
+            ("[nack]", 'the robot replied "nack"'),
+        ):
+            icub.reply = reply
+            assert await attempt(driver, Say("one"), FAR_S) == Failed(reason)
 
-            icub.reply = None
-            hanging = asyncio.create_task(attempt(driver, Say("two"), 0.2))
-            await until(lambda: ("d", 'say "two" "en"') in icub.got)
-            old = icub.talkers[0]
-            icub.reply = "[ok]"
-            assert await hanging == Failed("the robot did not finish within 0.2 s")
-            assert icub.got[-1] == ("d", "stop")
-            old.write(b'failed "late"\r\n')
-            assert await attempt(driver, Say("three"), FAR_S) == Done()
+        icub.reply = None
+        hanging = asyncio.create_task(attempt(driver, Say("two"), 0.2))
+        await until(lambda: ("d", 'say "two" "en"') in icub.got)
+        old = icub.talkers[0]
+        icub.reply = "[ok]"
+        assert await hanging == Failed("the robot did not finish within 0.2 s")
+        assert icub.got[-1] == ("d", "stop")
+        old.write(b'failed "late"\r\n')
+        assert await attempt(driver, Say("three"), FAR_S) == Done()
 
-            # Found out at the latest by the next act, after which it is connected anew.
-            for writer in icub.talkers:
-                writer.close()
-            await until(lambda: not driver.connected)
-            assert await attempt(driver, Say("four"), FAR_S) == Done()
+        # Found out at the latest by the next act, after which it is connected anew.
+        for writer in icub.talkers:
+            writer.close()
+        await until(lambda: not driver.connected)
+        assert await attempt(driver, Say("four"), FAR_S) == Done()
 
-            icub.reply = None
-            performing = asyncio.create_task(attempt(driver, Say("five"), FAR_S))
-            await until(lambda: ("d", 'say "five" "en"') in icub.got)
-            icub.talkers[-1].close()
-            icub.talkers[-2].close()
-            outcome = await performing
-            assert isinstance(outcome, Failed)
-            assert outcome.reason.startswith(f"{RPC} closed the connection")
-
-    run(test())
+        icub.reply = None
+        performing = asyncio.create_task(attempt(driver, Say("five"), FAR_S))
+        await until(lambda: ("d", 'say "five" "en"') in icub.got)
+        icub.talkers[-1].close()
+        icub.talkers[-2].close()
+        outcome = await performing
+        assert isinstance(outcome, Failed)
+        assert outcome.reason.startswith(f"{RPC} closed the connection")
 
 
-def test_what_the_robot_perceives_is_read_from_its_port(caplog: pytest.LogCaptureFixture) -> None:
-    async def test() -> None:
-        async with pair() as (driver, icub):
-            await until(lambda: icub.listeners)
-            icub.perceive("dance 1", "(", 'heard "ciao a tutti" 0.5', "button chest", 'affect "joy" 0.25 -0.5 "face" 2')
-            events = driver.events()
-            assert await anext(events) == Heard("ciao a tutti", 0.5)
-            assert await anext(events) == Button("chest")
-            assert await anext(events) == Affect("joy", valence=0.25, arousal=-0.5, source="face", seat=2)
-
-    run(test())
+async def test_what_the_robot_perceives_is_read_from_its_port(caplog: pytest.LogCaptureFixture) -> None:
+    async with pair() as (driver, icub):
+        await until(lambda: icub.listeners)
+        icub.perceive("dance 1", "(", 'heard "ciao a tutti" 0.5', "button chest", 'affect "joy" 0.25 -0.5 "face" 2')
+        events = driver.events()
+        assert await anext(events) == Heard("ciao a tutti", 0.5)
+        assert await anext(events) == Button("chest")
+        assert await anext(events) == Affect("joy", valence=0.25, arousal=-0.5, source="face", seat=2)
     assert '"dance" 1 is not a heard, button or affect' in caplog.text
     assert "a parenthesis is not closed" in caplog.text
 
 
-def test_a_port_of_events_that_was_away_is_read_again(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+async def test_a_port_of_events_that_was_away_is_read_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     monkeypatch.setattr("chefshat_robot.drivers.yarp.REOPEN_S", 0.01)
     caplog.set_level(logging.INFO)
-
-    async def test() -> None:
-        async with pair() as (driver, icub):
-            await until(lambda: icub.listeners)
-            # The module with this port ends, and starts again after a while.
-            there, icub.ports[EVENTS] = icub.ports[EVENTS], 0
-            icub.listeners.pop().close()
-            asked = len(icub.asked)
-            await until(lambda: icub.asked[asked:].count(EVENTS) >= 3)
-            icub.ports[EVENTS] = there
-            await until(lambda: icub.listeners)
-            icub.perceive("button chest")
-            assert await anext(driver.events()) == Button("chest")
-
-    run(test())
+    async with pair() as (driver, icub):
+        await until(lambda: icub.listeners)
+        # The module with this port ends, and starts again after a while.
+        there, icub.ports[EVENTS] = icub.ports[EVENTS], 0
+        icub.listeners.pop().close()
+        asked = len(icub.asked)
+        await until(lambda: icub.asked[asked:].count(EVENTS) >= 3)
+        icub.ports[EVENTS] = there
+        await until(lambda: icub.listeners)
+        icub.perceive("button chest")
+        assert await anext(driver.events()) == Button("chest")
     assert caplog.text.count(f"the connection to {EVENTS} was lost") == 1
     assert caplog.text.count("perception is not available") == 1
 
 
-def test_missing_name_servers_and_ports_are_explained() -> None:
-    async def test() -> None:
-        async with pair() as (_, icub):
-            missing = YarpDriver(port=icub.name_server_port, rpc="/nobody")
-            with pytest.raises(RobotError, match="knows no port /nobody: start the robot's module"):
-                await missing.connect()
-        with pytest.raises(RobotError, match="start `yarp server`"):
-            await YarpDriver(port=1, rpc=RPC).connect()
-
-    run(test())
+async def test_missing_name_servers_and_ports_are_explained() -> None:
+    async with pair() as (_, icub):
+        missing = YarpDriver(port=icub.name_server_port, rpc="/nobody")
+        with pytest.raises(RobotError, match="knows no port /nobody: start the robot's module"):
+            await missing.connect()
+    with pytest.raises(RobotError, match="start `yarp server`"):
+        await YarpDriver(port=1, rpc=RPC).connect()
 
 
 @pytest.mark.parametrize(

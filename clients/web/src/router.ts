@@ -37,97 +37,75 @@ export function isWall({ page }: Route): boolean {
   return page === "tournament" && new URLSearchParams(location.search).has("wall");
 }
 
+/** The path of each page. Parts with ":" are parameters, which may be missing with "?". Of several that fit, the first counts. */
+const PATHS: Readonly<Record<Exclude<Route["page"], "unknown">, string>> = {
+  lobby: "/",
+  new: "/new",
+  join: "/join/:code?",
+  room: "/rooms/:roomId",
+  attend: "/rooms/:roomId/table",
+  watch: "/watch/:roomId",
+  replay: "/replay/:gameId",
+  tournaments: "/tournaments",
+  newTournament: "/tournaments/new",
+  tournament: "/tournaments/:tournamentId",
+  results: "/tournaments/:tournamentId/results",
+  study: "/study/:link",
+  studies: "/studies",
+  newStudy: "/studies/new",
+  ownStudy: "/studies/:studyId",
+  leaderboard: "/leaderboard",
+  person: "/people/:name/:fingerprint?",
+  tutorial: "/tutorial",
+  rules: "/rules",
+};
+
 /** Parses a path such as "/rooms/0123". */
 export function routeOf(path: string): Route {
-  const parts = path.split("/").filter((part) => part !== "");
-  const [first, second, third] = parts.map(decoded);
-  if (parts.length === 3 && first === "rooms" && third === "table") return { page: "attend", roomId: second ?? "" };
-  if (parts.length === 3 && first === "tournaments" && third === "results")
-    return { page: "results", tournamentId: second ?? "" };
-  if (parts.length === 3 && first === "people") return personOf(second ?? "", third ?? "");
-  if (parts.length > 2) return { page: "unknown" };
-  if (second === undefined) {
-    switch (first) {
-      case undefined:
-        return { page: "lobby" };
-      case "new":
-        return { page: "new" };
-      case "join":
-        return { page: "join", code: "" };
-      case "tournaments":
-        return { page: "tournaments" };
-      case "studies":
-        return { page: "studies" };
-      case "leaderboard":
-        return { page: "leaderboard" };
-      case "tutorial":
-        return { page: "tutorial" };
-      case "rules":
-        return { page: "rules" };
-      default:
-        return { page: "unknown" };
-    }
+  const given = partsOf(path).map(decoded);
+  for (const [page, pattern] of Object.entries(PATHS)) {
+    const parts = partsOf(pattern).map((part, index) => ({ part, value: given[index] }));
+    const isFitting = parts.every(({ part, value }) => {
+      return part.startsWith(":") ? value !== undefined || part.endsWith("?") : value === part;
+    });
+    if (!isFitting || given.length > parts.length) continue;
+    const parameters = parts.filter(({ part }) => part.startsWith(":"));
+    // TypeScript cannot see that the parameters are those of the page.
+    return { page, ...Object.fromEntries(parameters.map(({ part, value = "" }) => [nameOf(part), value])) } as Route;
   }
-  switch (first) {
-    case "rooms":
-      return { page: "room", roomId: second };
-    case "join":
-      return { page: "join", code: second };
-    case "watch":
-      return { page: "watch", roomId: second };
-    case "replay":
-      return { page: "replay", gameId: second };
-    case "tournaments":
-      return second === "new" ? { page: "newTournament" } : { page: "tournament", tournamentId: second };
-    case "study":
-      return { page: "study", link: second };
-    case "studies":
-      return second === "new" ? { page: "newStudy" } : { page: "ownStudy", studyId: second };
-    case "people":
-      return personOf(second, "");
-    default:
-      return { page: "unknown" };
-  }
-}
-
-function personOf(name: string, fingerprint: string): Route {
-  return { page: "person", name: name === ". " || name === ".. " ? name.trim() : name, fingerprint };
+  return { page: "unknown" };
 }
 
 /** Formats the path of a route; the inverse of `routeOf`. */
 export function pathOf(route: Route): string {
-  switch (route.page) {
-    case "lobby":
-      return "/";
-    case "room":
-      return `/rooms/${encodeURIComponent(route.roomId)}`;
-    case "attend":
-      return `/rooms/${encodeURIComponent(route.roomId)}/table`;
-    case "join":
-      return route.code === "" ? "/join" : `/join/${encodeURIComponent(route.code)}`;
-    case "watch":
-      return `/watch/${encodeURIComponent(route.roomId)}`;
-    case "replay":
-      return `/replay/${encodeURIComponent(route.gameId)}`;
-    case "newTournament":
-      return "/tournaments/new";
-    case "tournament":
-      return `/tournaments/${encodeURIComponent(route.tournamentId)}`;
-    case "results":
-      return `/tournaments/${encodeURIComponent(route.tournamentId)}/results`;
-    case "person":
-      // Browsers resolve the parts "." and "..", however they are encoded. Names never end with a space.
-      return `/people/${encodeURIComponent(route.name)}${/^\.{1,2}$/.test(route.name) ? "%20" : ""}${route.fingerprint && `/${encodeURIComponent(route.fingerprint)}`}`;
-    case "study":
-      return `/study/${encodeURIComponent(route.link)}`;
-    case "newStudy":
-      return "/studies/new";
-    case "ownStudy":
-      return `/studies/${encodeURIComponent(route.studyId)}`;
-    case "unknown":
-      return "/";
-    default:
-      return `/${route.page}`;
+  if (route.page === "unknown") return "/";
+  const values: Readonly<Record<string, string>> = { ...route };
+  const parts = partsOf(PATHS[route.page]).map((part) => {
+    return part.startsWith(":") ? encoded(values[nameOf(part)] ?? "") : part;
+  });
+  return `/${parts.filter((part) => part !== "").join("/")}`;
+}
+
+function partsOf(path: string): string[] {
+  return path.split("/").filter((part) => part !== "");
+}
+
+/** The name of a parameter in a path. */
+function nameOf(part: string): string {
+  return part.replaceAll(/[:?]/g, "");
+}
+
+/** Encodes a part of an address. Browsers resolve "." and "..": these get a space, with which no name ends. */
+function encoded(part: string): string {
+  return encodeURIComponent(part.replace(/^\.{1,2}$/, "$& "));
+}
+
+/** Decodes a part of an address; returns a badly encoded part unchanged. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part).replace(/^(\.{1,2}) $/, "$1");
+  } catch {
+    return part;
   }
 }
 
@@ -277,13 +255,4 @@ function followLink(event: MouseEvent): void {
   event.preventDefault();
   push(link.href);
   arrive(0);
-}
-
-/** Decodes a part of an address; returns a badly encoded part unchanged. */
-function decoded(part: string): string {
-  try {
-    return decodeURIComponent(part);
-  } catch {
-    return part;
-  }
 }

@@ -2,7 +2,7 @@
 // what is late blocks nothing.
 
 import { create } from "@bufbuild/protobuf";
-import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { playApi } from "../src/api/client";
 import { AnswerStatus } from "../src/gen/chefshat/v1/decision_pb";
 import { ActResponseSchema, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";
@@ -13,13 +13,7 @@ import { emptyTable } from "../src/table/model/state";
 import { AWAY } from "./refusals";
 
 beforeAll(() => setLanguage("en"));
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** The request of a decision. */
 function requested(decisionId: bigint): SeatUpdate {

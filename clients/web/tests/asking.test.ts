@@ -1,12 +1,11 @@
 // Asking until the server answers: after growing pauses, when the browser is back online, and not before
 // the server wants it.
 
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { askUntilAnswered } from "../src/api/asking";
 import { AWAY, refused, tooMany } from "./refusals";
 
 beforeEach(() => void vi.useFakeTimers());
-afterEach(() => void vi.useRealTimers());
 
 /** An answer after these errors, and when each was asked for. */
 function asked(errors: Error[], isWanted = () => true) {

@@ -1,16 +1,13 @@
 // What an attendant types and opens: cards, links with a ticket.
 
 import { create } from "@bufbuild/protobuf";
-import { beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { cardsOfDraft, draftOf, entriesAt, handText, NO_PLAY, parseHand, seenOf } from "../src/attend/entries";
 import { attendantLink, keepTableTicket, tableTicket, takeTicket, ticketIn } from "../src/attend/ticket";
 import { SeenCardsSchema } from "../src/gen/chefshat/v1/table_service_pb";
-import { forgetAll } from "../src/store";
 import { DEALT, stateOf } from "./table-state";
 
 const DECK = { faces: 11, jokers: 2 };
-
-beforeEach(() => forgetAll());
 
 test.each([
   ["", [], undefined],

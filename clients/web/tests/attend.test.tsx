@@ -1,9 +1,8 @@
 // The attendant's view: what it shows of each state, and the reports that its controls send.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 import { tableApi } from "../src/api/client";
 import { secretsFor } from "../src/api/secrets";
 import { AttendPage } from "../src/attend/AttendPage";
@@ -15,7 +14,7 @@ import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import { TableServiceWatchResponseSchema, TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
 import { setLanguage } from "../src/i18n";
 import { forgetAll } from "../src/store";
-import { root, settle } from "./mounted";
+import { fieldOf, mount, root, settle, type as typeInto } from "./mounted";
 import { DEALT, OBSERVATION, stateOf } from "./table-state";
 
 let sent: ReportKind[];
@@ -26,21 +25,16 @@ beforeEach(() => {
   outcome = { kind: "accepted" };
 });
 
-afterEach(() => void vi.restoreAllMocks());
-
 const show = (state: TableState) =>
-  act(() =>
-    render(
-      <AttendView
-        state={state}
-        trouble=""
-        report={async (what) => {
-          sent.push(what);
-          return outcome;
-        }}
-      />,
-      root,
-    ),
+  mount(
+    <AttendView
+      state={state}
+      trouble=""
+      report={async (what) => {
+        sent.push(what);
+        return outcome;
+      }}
+    />,
   );
 
 /** The accessible name of a button. */
@@ -51,21 +45,10 @@ const button = (name: string, within: ParentNode = root) => {
   return found[0];
 };
 /** Presses a button, and lets what it sends be answered. */
-const press = (name: string, within?: ParentNode) =>
-  act(async () => {
-    button(name, within).click();
-    await new Promise((resolve) => setTimeout(resolve));
-  });
+const press = (name: string, within?: ParentNode) => act(() => button(name, within).click()).then(settle);
 const part = (name: string) => root.querySelector(`[data-part~="${name}"]`);
 const heading = () => part("awaited-heading")?.textContent?.replace(/^\d/, "");
-const type = (label: string, text: string) =>
-  act(() => {
-    const found = [...root.querySelectorAll("label")].find(({ textContent }) => textContent === label);
-    const input = root.querySelector<HTMLInputElement>(`[id="${found?.htmlFor}"]`);
-    if (!input) throw new Error(`no field "${label}"`);
-    input.value = text;
-    input.dispatchEvent(new Event("input", { bubbles: true }));
-  });
+const type = (label: string, text: string) => typeInto(fieldOf(label), text);
 
 describe("what the table waits for", () => {
   test.each([
@@ -471,7 +454,7 @@ async function showWaiting(state: TableState): Promise<(outcome?: Outcome) => Pr
     sent.push(what);
     return new Promise<Outcome>((resolve) => waiting.push(resolve));
   };
-  await act(() => render(<AttendView state={state} trouble="" report={report} />, root));
+  await mount(<AttendView state={state} trouble="" report={report} />);
   return async (outcome = { kind: "accepted" }) => {
     waiting.shift()?.(outcome);
     await settle();
@@ -515,10 +498,10 @@ test("a device that had only the ticket of a private table shows its replay afte
   vi.spyOn(tableApi, "watch").mockImplementation(async function* () {
     yield create(TableServiceWatchResponseSchema, { state });
   });
-  await act(() => render(<AttendPage route={{ page: "attend", roomId }} />, root));
+  await mount(<AttendPage route={{ page: "attend", roomId }} />);
   await settle();
   expect(heading()).toBe("The game is over");
-  await act(() => render(null, root));
+  await mount(null);
   expect(secretsFor("GetRecord", { gameId: "g1" })).toEqual([ticket]);
   forgetAll();
   history.replaceState(null, "", "/");

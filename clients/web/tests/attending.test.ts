@@ -16,14 +16,14 @@ import { AWAY } from "./refusals";
 import { stateOf } from "./table-state";
 
 let attending: Attending;
-const report = vi.spyOn(tableApi, "report");
-const watch = vi.spyOn(tableApi, "watch");
+const spy = () => vi.spyOn(tableApi, "report");
+let report: ReturnType<typeof spy>;
 
 beforeEach(async () => {
   await startLanguage();
   vi.useFakeTimers();
-  report.mockReset();
-  watch.mockImplementation(async function* (_, options) {
+  report = spy();
+  vi.spyOn(tableApi, "watch").mockImplementation(async function* (_, options) {
     yield create(TableServiceWatchResponseSchema, { state: stateOf({ version: 5n }) });
     yield create(TableServiceWatchResponseSchema, {});
     await new Promise((_, reject) => options?.signal?.addEventListener("abort", () => reject(new Error("closed"))));
@@ -31,10 +31,7 @@ beforeEach(async () => {
   attending = startAttending("t1");
 });
 
-afterEach(() => {
-  attending.stop();
-  vi.useRealTimers();
-});
+afterEach(() => attending.stop());
 
 const answers = (verdict: ReportVerdict, voidReports = 0, version = 6n) =>
   create(ReportResponseSchema, {

@@ -2,7 +2,6 @@
 // and allowed, and never asked for by itself.
 
 import { readFileSync } from "node:fs";
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Settings } from "../src/parts/Settings";
@@ -10,7 +9,7 @@ import { useTab } from "../src/parts/tab";
 import { isOn, setPreference } from "../src/preferences";
 import { useAttention } from "../src/table/attention";
 import type { OpenDecision } from "../src/table/model/live";
-import { eventually, root } from "./mounted";
+import { eventually, fieldOf, mount, root } from "./mounted";
 
 const TURN = { id: 7n } as unknown as OpenDecision;
 
@@ -65,8 +64,6 @@ beforeEach(() => {
 });
 
 afterEach(() => {
-  vi.unstubAllGlobals();
-  vi.restoreAllMocks();
   for (const name of ["vibrate", "userActivation", "wakeLock", "serviceWorker"])
     Reflect.deleteProperty(navigator, name);
   for (const name of ["tab", "vibration", "awake"] as const) setPreference(name, true);
@@ -74,7 +71,7 @@ afterEach(() => {
 });
 
 const show = (decision: OpenDecision | undefined, playing = true) =>
-  act(() => render(<Page decision={decision} playing={playing} />, root));
+  mount(<Page decision={decision} playing={playing} />);
 
 test("the title and the icon say whose turn it is, as long as it is", async () => {
   const icon = document.head.appendChild(document.createElement("link"));
@@ -139,11 +136,11 @@ test("each table has a notification of its own, which closes with its decision",
       <AtTable room="02" decision={TURN} playing />
     </>
   );
-  await act(() => render(two(TURN), root));
+  await mount(two(TURN));
   await eventually(() => expect(open.size).toBe(2));
   const [first, second] = open.values();
   expect([first?.title, first?.path]).toEqual(["Your turn", location.pathname]);
-  await act(() => render(two(undefined), root));
+  await mount(two(undefined));
   await eventually(() => expect([...open.values()]).toEqual([second]));
 });
 
@@ -207,10 +204,9 @@ test.each([
   ["denied", false],
 ])("the settings ask the browser on a click; if it is %s, the switch is %s", async (answer, on) => {
   asked.mockImplementation(async () => answer);
-  await act(() => render(<Settings onClose={() => {}} />, root));
+  await mount(<Settings onClose={() => {}} />);
   expect(asked).not.toHaveBeenCalled();
-  const label = [...root.querySelectorAll("label")].find((one) => one.textContent === "Notify me on my turn");
-  await act(() => root.querySelector<HTMLInputElement>(`#${CSS.escape(label?.htmlFor ?? "")}`)?.click());
+  await act(() => fieldOf("Notify me on my turn")?.click());
   await eventually(() => expect(isOn("notification")).toBe(on));
   expect(asked).toHaveBeenCalledTimes(1);
   await act(() => undefined);

@@ -2,9 +2,8 @@
 // by name, giving its place to an agent, and the links of people who take over a place.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { tournamentApi } from "../src/api/client";
 import { TournamentGameState, TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import {
@@ -18,10 +17,10 @@ import {
 } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { t } from "../src/i18n";
 import { WhichOne } from "../src/lobby/WhichOne";
-import { forgetAll, remember } from "../src/store";
+import { remember } from "../src/store";
 import { ManageGames, ManageParticipants, Pause } from "../src/tournaments/ByHand";
 import { hostedTournament, placeLinks, removeParticipant, replaceByPerson } from "../src/tournaments/hosting";
-import { button, press, root, settle } from "./mounted";
+import { button, mount, press, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TICKET = "ab".repeat(48);
@@ -29,10 +28,6 @@ const OWNER = { tournamentId: ID, ownerToken: "cd".repeat(48) };
 
 beforeEach(() => {
   remember(`organised.${ID}`, JSON.stringify({ joinCode: "ABCD", ownerToken: OWNER.ownerToken }));
-});
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 const tournament = (names: readonly string[], state = TournamentState.OPEN) =>
@@ -42,7 +37,7 @@ const tournament = (names: readonly string[], state = TournamentState.OPEN) =>
     participants: names.map((name, participant) => ({ name, participant })),
   });
 const show = (...names: string[]) =>
-  act(() => render(<ManageParticipants tournament={tournament(names)} agents={["greedy", "trained"]} />, root));
+  mount(<ManageParticipants tournament={tournament(names)} agents={["greedy", "trained"]} />);
 const removing = () =>
   vi.spyOn(tournamentApi, "removeParticipant").mockResolvedValue(create(RemoveParticipantResponseSchema));
 const replacing = () =>
@@ -106,7 +101,7 @@ test("a device asks which of two places it shall have", async () => {
   const decide = vi.fn();
   const held = { ticket: TICKET, participant: 0, name: "Ada" };
   const brought = { ticket: "ef".repeat(48), participant: 1, name: "Bo" };
-  await act(() => render(<WhichOne {...{ held, brought, decide }} words={t().tournaments.part.which} />, root));
+  await mount(<WhichOne {...{ held, brought, decide }} words={t().tournaments.part.which} />);
   expect(root.textContent).toContain("this device loses the place of Ada");
   await press("Continue as Ada");
   await press("Take part as Bo");
@@ -148,7 +143,7 @@ test("a tournament is paused and resumed, and an error is shown", async () => {
   pause.mockRejectedValueOnce(new Error("not now")).mockResolvedValue(create(PauseTournamentResponseSchema));
   const resume = vi.spyOn(tournamentApi, "resumeTournament");
   resume.mockResolvedValue(create(ResumeTournamentResponseSchema));
-  const showPause = (paused: boolean) => act(() => render(<Pause tournament={{ ...tournament([]), paused }} />, root));
+  const showPause = (paused: boolean) => mount(<Pause tournament={{ ...tournament([]), paused }} />);
   await showPause(false);
   expect(root.textContent).toContain("No new game starts; running games continue.");
   await press("Pause");
@@ -191,11 +186,11 @@ test("a due game is called or postponed, a void one called again, and no other g
   const postpone = vi.spyOn(tournamentApi, "postponeGame").mockResolvedValue(create(PostponeGameResponseSchema));
   const live = { tournament: tournament(names, TournamentState.PLAYING), standings: [], games: [] };
   // Another part of the page shows them, too.
-  await act(() => render([<ManageGames key="one" live={live} />, <ManageGames key="other" live={live} />], root));
+  await mount([<ManageGames key="one" live={live} />, <ManageGames key="other" live={live} />]);
   await settle();
   expect(root.querySelectorAll('[data-part="manage-games"]')).toHaveLength(2);
   expect(list).toHaveBeenCalledTimes(1);
-  await act(() => render(<ManageGames live={live} />, root));
+  await mount(<ManageGames live={live} />);
   await settle();
   const [due, again, ...others] = root.querySelectorAll("li");
   expect(others).toEqual([]);

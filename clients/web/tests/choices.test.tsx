@@ -3,9 +3,8 @@
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { analysisApi, recordApi } from "../src/api/client";
 import { EvaluateResponseSchema } from "../src/gen/chefshat/v1/analysis_service_pb";
 import { GetRecordResponseSchema } from "../src/gen/chefshat/v1/record_service_pb";
@@ -16,11 +15,9 @@ import { Graph } from "../src/replay/Graph";
 import { Highlights } from "../src/replay/Highlights";
 import { useFilm } from "../src/replay/hooks";
 import { legalActions } from "../src/table/model/actions";
-import { eventually, root, settle } from "./mounted";
+import { eventually, mount, root, settle } from "./mounted";
 import { recorded } from "./record";
 import { AWAY, refused } from "./refusals";
-
-afterEach(() => vi.restoreAllMocks());
 
 const FILM = filmOf(recorded("fixed"));
 const ALL = choices(FILM);
@@ -94,9 +91,7 @@ test("the graph asks while it is open, and its list and its picture lead to the 
   const evaluate = answers((decisions, action) => (decisions === worst?.decisions && action !== worst.taken ? 3 : 1));
   const onGo = vi.fn();
   const table = FILM.at(0).table;
-  await act(() =>
-    render(<Graph gameId="g" film={FILM} table={table} perspective="all" decisions={3} onGo={onGo} />, root),
-  );
+  await mount(<Graph gameId="g" film={FILM} table={table} perspective="all" decisions={3} onGo={onGo} />);
   await settle();
   expect(evaluate).not.toHaveBeenCalled();
   await open();
@@ -121,9 +116,7 @@ test("from a seat the graph has the decisions of that seat alone", async () => {
     ALL.some((choice) => choice.decisions === decisions && choice.taken === action) ? 1 : 2,
   );
   const { table } = FILM.at(0);
-  await act(() =>
-    render(<Graph gameId="g" film={FILM} {...{ table }} perspective={1} decisions={0} onGo={() => {}} />, root),
-  );
+  await mount(<Graph gameId="g" film={FILM} {...{ table }} perspective={1} decisions={0} onGo={() => {}} />);
   await open();
   await answered();
   const turning = [...root.querySelectorAll('[data-part~="turning-points"] button')].map(
@@ -148,12 +141,7 @@ function refuses(codes: Record<number, ConnectError>) {
 }
 
 const graph = () =>
-  act(() =>
-    render(
-      <Graph gameId="g" film={FILM} table={FILM.at(0).table} perspective="all" decisions={0} onGo={() => {}} />,
-      root,
-    ),
-  );
+  mount(<Graph gameId="g" film={FILM} table={FILM.at(0).table} perspective="all" decisions={0} onGo={() => {}} />);
 
 test("a decision that cannot be estimated is left out, any other error is said and the rest resumed", async () => {
   const evaluate = refuses({
@@ -204,11 +192,11 @@ test("at the end of a game a player asks for the best and the costliest own deci
     yield create(GetRecordResponseSchema, { lines: recorded("fixed") });
   });
   const over = { ...FILM.at(FILM.length - 1).table, phase: "gameOver" as const, gameId: "g" };
-  await act(() => render(<Highlights table={{ ...over, phase: "shiftOver" }} own={0} />, root));
+  await mount(<Highlights table={{ ...over, phase: "shiftOver" }} own={0} />);
   expect(root.childElementCount).toBe(0);
-  await act(() => render(<Highlights table={{ ...over, physical: true }} own={0} />, root));
+  await mount(<Highlights table={{ ...over, physical: true }} own={0} />);
   expect(root.childElementCount).toBe(0);
-  await act(() => render(<Highlights table={over} own={0} />, root));
+  await mount(<Highlights table={over} own={0} />);
   expect(evaluate).not.toHaveBeenCalled();
   await act(() => root.querySelector("button")?.click());
   await settle();
@@ -235,10 +223,10 @@ test("a record is read again while the server is away, from its beginning, and n
     seen.push(fault || String(film?.length));
     return null;
   }
-  await act(() => render(<Page gameId="g" />, root));
+  await mount(<Page gameId="g" />);
   await eventually(() => expect(seen.at(-1)).toBe(String(FILM.length)));
   expect(seen).toContain(t().faults.notReached);
-  await act(() => render(<Page key="other" gameId="other" />, root));
+  await mount(<Page key="other" gameId="other" />);
   await eventually(() => expect(seen.at(-1)).not.toBe(String(FILM.length)));
   await settle();
   expect(reads).toHaveBeenCalledTimes(3);

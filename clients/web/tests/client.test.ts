@@ -1,9 +1,7 @@
 // Calls have a deadline, streams have none.
 
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { playApi, serverApi } from "../src/api/client";
-
-afterEach(() => void vi.unstubAllGlobals());
 
 test("a call has a deadline unless it sets its own, and a stream has none", async () => {
   const deadlines: (string | null)[] = [];

@@ -1,28 +1,21 @@
 // The confirm button: focus, a single action, and errors.
 
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { beforeEach, expect, test } from "vitest";
 import { ConfirmButton } from "../src/parts/ConfirmButton";
-import { root } from "./mounted";
+import { button, mount, press, root } from "./mounted";
 
 let calls: { done: () => void; failed: (why: Error) => void }[];
 
 beforeEach(async () => {
   calls = [];
   const perform = () => new Promise<void>((done, failed) => calls.push({ done, failed }));
-  await act(() =>
-    render(
-      <ConfirmButton label="Close…" confirm="Do it" act={perform}>
-        It ends for everybody.
-      </ConfirmButton>,
-      root,
-    ),
+  await mount(
+    <ConfirmButton label="Close…" confirm="Do it" act={perform}>
+      It ends for everybody.
+    </ConfirmButton>,
   );
 });
-
-const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);
-const press = (words: string) => act(() => button(words)?.click());
 
 test("the question gets the focus, and then the button", async () => {
   await press("Close…");

@@ -8,7 +8,7 @@ import { beforeAll, expect, test } from "vitest";
 import { faultOf, inWords, isPassing, needsToken } from "../src/api/faults";
 import { ErrorInfoSchema, RetryInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { startLanguage } from "../src/i18n";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 
 beforeAll(startLanguage);
 

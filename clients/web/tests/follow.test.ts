@@ -2,19 +2,14 @@
 // good.
 
 import { Code, ConnectError, type UnaryRequest, type UnaryResponse } from "@connectrpc/connect";
-import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { wordsOf } from "../src/api/faults";
 import { askHeartbeats, follow } from "../src/api/follow";
 import { setLanguage } from "../src/i18n";
 import { AWAY, tooMany } from "./refusals";
 
 beforeAll(() => setLanguage("en"));
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** A stream of these messages that then throws or ends. */
 async function* stream(messages: readonly string[], thrown?: unknown): AsyncGenerator<string> {
@@ -24,86 +19,59 @@ async function* stream(messages: readonly string[], thrown?: unknown): AsyncGene
 
 test("a lost stream is reopened until it ends", async () => {
   const streams = [stream(["a"], AWAY), stream([], AWAY), stream(["b"]), stream(["c", "end", "never"])];
-  let opened = 0;
+  const open = vi.fn(() => streams.shift() ?? stream([]));
   const heard: string[] = [];
-  const following = follow(
-    () => streams[opened++] ?? stream([]),
-    (message) => {
-      heard.push(message);
-      return message !== "end";
-    },
-  );
+  const following = follow(open, (message) => {
+    heard.push(message);
+    return message !== "end";
+  });
   await vi.advanceTimersByTimeAsync(0);
   expect(following.link.value).toBe("lost");
   await vi.advanceTimersByTimeAsync(60_000);
   expect(heard).toEqual(["a", "b", "c", "end"]);
-  expect(opened).toBe(4);
+  expect(open).toHaveBeenCalledTimes(4);
   expect(following.link.value).toBe("ended");
 });
 
 test("a stream that ends is not reopened if the server had nothing more to send", async () => {
-  let opened = 0;
+  const open = vi.fn(() => stream(["a", "b"]));
   const heard: string[] = [];
-  const following = follow(
-    () => {
-      opened += 1;
-      return stream(["a", "b"]);
-    },
-    (message) => heard.push(message) > 0,
-    { isComplete: () => heard.length === 2 },
-  );
+  const isComplete = () => heard.length === 2;
+  const following = follow(open, (message) => heard.push(message) > 0, { isComplete });
   await vi.advanceTimersByTimeAsync(60_000);
-  expect([opened, heard, following.link.value]).toEqual([1, ["a", "b"], "ended"]);
+  expect(open).toHaveBeenCalledTimes(1);
+  expect([heard, following.link.value]).toEqual([["a", "b"], "ended"]);
 });
 
 test("an error that a retry does not fix ends the stream", async () => {
-  let opened = 0;
-  const following = follow(
-    () => {
-      opened += 1;
-      return stream([], new ConnectError("who?", Code.NotFound));
-    },
-    () => true,
-  );
+  const open = vi.fn(() => stream([], new ConnectError("who?", Code.NotFound)));
+  const following = follow(open, () => true);
   await vi.advanceTimersByTimeAsync(60_000);
   expect(following.link.value).toBe("failed");
   expect(following.fault.value?.code).toBe(Code.NotFound);
-  expect(opened).toBe(1);
+  expect(open).toHaveBeenCalledTimes(1);
 });
 
 test("a stream that a limit refuses is opened again when the server says so", async () => {
-  let opened = 0;
-  const following = follow(
-    () => {
-      opened += 1;
-      return opened === 1 ? stream([], tooMany(20_000)) : stream(["end"]);
-    },
-    () => false,
-  );
+  const open = vi.fn(() => stream(["end"])).mockImplementationOnce(() => stream([], tooMany(20_000)));
+  const following = follow(open, () => false);
   await vi.advanceTimersByTimeAsync(19_000);
-  expect([following.link.value, opened]).toEqual(["lost", 1]);
+  expect([following.link.value, open.mock.calls.length]).toEqual(["lost", 1]);
   await vi.advanceTimersByTimeAsync(1_000);
-  expect([following.link.value, opened]).toEqual(["ended", 2]);
+  expect([following.link.value, open.mock.calls.length]).toEqual(["ended", 2]);
 });
 
 test("an exception of the page is not a lost connection", async () => {
   const log = vi.spyOn(console, "error").mockImplementation(() => {});
-  let opened = 0;
-  const following = follow(
-    () => {
-      opened += 1;
-      return stream(["a", "b"]);
-    },
-    () => {
-      throw new TypeError("no such card");
-    },
-  );
+  const open = vi.fn(() => stream(["a", "b"]));
+  const following = follow(open, () => {
+    throw new TypeError("no such card");
+  });
   await vi.advanceTimersByTimeAsync(60_000);
-  expect(opened).toBe(1);
+  expect(open).toHaveBeenCalledTimes(1);
   expect(following.link.value).toBe("failed");
   expect(following.fault.value && wordsOf(following.fault.value)).toContain("Reload");
   expect(log).toHaveBeenCalledOnce();
-  log.mockRestore();
 });
 
 test("streams ask for heartbeats, other calls do not", async () => {
@@ -157,32 +125,22 @@ test.each([true, false])(
     await vi.advanceTimersByTimeAsync(0);
     expect([opened, open, following.link.value]).toEqual([2, 1, "open"]);
     following.stop();
-    page.mockRestore();
   },
 );
 
 test("a stream in a tab that is opened in the background rests until somebody looks", async () => {
   const page = vi.spyOn(document, "visibilityState", "get").mockReturnValue("hidden");
-  let opened = 0;
-  const following = follow(
-    async function* (abort) {
-      opened += 1;
-      yield "heartbeat";
-      await untilAborted(abort);
-    },
-    () => true,
-    { restsWhileHidden: true },
-  );
+  const open = vi.fn(beatOnce);
+  const following = follow(open, () => true, { restsWhileHidden: true });
   await vi.advanceTimersByTimeAsync(600_000);
-  const before = opened;
+  const before = open.mock.calls.length;
   await vi.advanceTimersByTimeAsync(600_000);
-  expect(opened).toBe(before);
+  expect(open).toHaveBeenCalledTimes(before);
   page.mockReturnValue("visible");
   document.dispatchEvent(new Event("visibilitychange"));
   await vi.advanceTimersByTimeAsync(0);
-  expect(opened).toBe(before + 1);
+  expect(open).toHaveBeenCalledTimes(before + 1);
   following.stop();
-  page.mockRestore();
 });
 
 /** What a call that is aborted throws. */
@@ -192,31 +150,30 @@ function untilAborted(abort: AbortSignal): Promise<never> {
   });
 }
 
+/** A stream that is silent after its first message. */
+async function* beatOnce(abort: AbortSignal): AsyncGenerator<string> {
+  yield "heartbeat";
+  await untilAborted(abort);
+}
+
 test("a silent stream is reopened", async () => {
-  let opened = 0;
-  const following = follow(
-    async function* (abort) {
-      opened += 1;
-      yield "heartbeat";
-      await untilAborted(abort);
-    },
-    () => true,
-  );
+  const open = vi.fn(beatOnce);
+  const following = follow(open, () => true);
   await vi.advanceTimersByTimeAsync(8_000);
-  expect(opened).toBe(1);
+  expect(open).toHaveBeenCalledTimes(1);
   expect(following.link.value).toBe("open");
   await vi.advanceTimersByTimeAsync(3_000);
-  expect(opened).toBe(2);
+  expect(open).toHaveBeenCalledTimes(2);
   // Those of the former network are dead.
   window.dispatchEvent(new Event("online"));
   await vi.advanceTimersByTimeAsync(300);
-  expect(opened).toBe(3);
+  expect(open).toHaveBeenCalledTimes(3);
   // Somebody sets the clock of the device back.
   vi.setSystemTime(Date.now() - 3_600_000);
   await vi.advanceTimersByTimeAsync(11_000);
-  expect(opened).toBe(4);
+  expect(open).toHaveBeenCalledTimes(4);
   following.stop();
   await vi.advanceTimersByTimeAsync(120_000);
-  expect(opened).toBe(4);
+  expect(open).toHaveBeenCalledTimes(4);
   expect(following.link.value).toBe("ended");
 });

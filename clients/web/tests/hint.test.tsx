@@ -2,8 +2,6 @@
 // The replay says which decisions had one.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
-import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
@@ -13,28 +11,19 @@ import { Decision } from "../src/replay/ReplayPage";
 import type { GivenHint } from "../src/table/acting";
 import { actionOf } from "../src/table/model/actions";
 import { cardsFromNumbers } from "../src/table/model/cards";
-import type { OpenDecision } from "../src/table/model/live";
 import { TableView } from "../src/table/view/TableView";
-import { root } from "./mounted";
-import { DEALT, stateOf } from "./table-state";
+import { mount, root } from "./mounted";
+import { DEALT, decisionOf, stateOf } from "./table-state";
 
 const FACES = 11;
 const PASS = actionOf({ kind: "pass" }, FACES);
 const NINES = actionOf({ kind: "play", face: 9, quantity: 2, jokers: 0 }, FACES);
-const decision = {
-  id: 7n,
-  kind: DecisionKind.TURN,
-  hand: cardsFromNumbers([3, 9, 9], false, FACES),
-  legal: [NINES, PASS],
-  timeLeftMs: 0,
-  bankLeftMs: 0,
-  receivedAtMs: 0,
-} as unknown as OpenDecision;
+const decision = decisionOf(cardsFromNumbers([3, 9, 9], false, FACES), [NINES, PASS]);
 
 const show = (hint: GivenHint | undefined, onHint?: () => void) => {
   const table = { ...tableOf(stateOf({ observation: DEALT })), phase: "pizza" as const, faces: FACES };
   const props = { table, own: 2, decision, hint, onHint, untimed: true, onAnswer: () => {} };
-  return act(() => render(<TableView {...props} />, root));
+  return mount(<TableView {...props} />);
 };
 const button = (id: string) => root.querySelector<HTMLButtonElement>(`[data-action="${id}"]`);
 const text = () => root.querySelector('[data-part~="hint"]')?.textContent;
@@ -84,6 +73,6 @@ test.each([
 ])("the replay of a decision with %d hints", async (hints, words) => {
   const table = { ...tableOf(stateOf({ observation: DEALT })), faces: FACES };
   const open = create(DecisionRecordSchema, { seat: 0, kind: DecisionKind.TURN, action: PASS, hints });
-  await act(() => render(<Decision table={table} open={open} />, root));
+  await mount(<Decision table={table} open={open} />);
   expect(root.querySelector("summary .soft")?.textContent).toBe(words);
 });

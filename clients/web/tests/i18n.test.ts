@@ -2,7 +2,7 @@
 
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { firstKnown, languages, setLanguage, showLanguage, t } from "../src/i18n";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { time } from "../src/i18n/en/time";
 import { ordinals, plurals } from "../src/i18n/plural";
 
@@ -91,20 +91,17 @@ describe("texts that come late or not at all", () => {
   });
   afterEach(() => {
     vi.doUnmock("../src/i18n/de");
-    vi.unstubAllGlobals();
-    vi.useRealTimers();
-    localStorage.clear();
   });
 
   test("of two languages the one that was chosen last is shown", async () => {
-    const { de } = await import("../src/i18n/de");
+    const de = await import("../src/i18n/de");
     let arrive = () => {};
     const late = new Promise<void>((resolve) => {
       arrive = resolve;
     });
     vi.doMock("../src/i18n/de", async () => {
       await late;
-      return { de };
+      return de;
     });
     const i18n = await import("../src/i18n");
     const first = i18n.setLanguage("de");

@@ -2,9 +2,8 @@
 // tournament that only its code shows.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { roomApi, tournamentApi } from "../src/api/client";
 import { ParticipantSchema, RoomState, Visibility } from "../src/gen/chefshat/v1/room_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
@@ -12,9 +11,8 @@ import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tourna
 import { GetTournamentResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { t } from "../src/i18n";
 import { Join } from "../src/lobby/Join";
-import { forgetAll } from "../src/store";
 import { TournamentPage } from "../src/tournaments/TournamentPage";
-import { root } from "./mounted";
+import { later, mount, root, type } from "./mounted";
 import { AWAY, refused } from "./refusals";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
@@ -34,29 +32,17 @@ const tournament = () =>
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
 });
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-  forgetAll();
-  history.replaceState(null, "", "/");
-});
-
-async function pass(ms: number) {
-  await act(async () => {
-    await vi.advanceTimersByTimeAsync(ms);
-  });
-}
 
 async function opened() {
-  await act(() => render(<Join route={{ page: "join", code: CODE }} />, root));
-  await pass(0);
+  await mount(<Join route={{ page: "join", code: CODE }} />);
+  await later(0);
 }
 
 test("a wrong code is sent once, and its page says that it is wrong", async () => {
   const rooms = vi.spyOn(roomApi, "getRoom").mockRejectedValue(refused("JOIN_CODE_WRONG"));
   const tournaments = vi.spyOn(tournamentApi, "getTournament").mockRejectedValue(refused("JOIN_CODE_WRONG"));
   await opened();
-  await pass(600_000);
+  await later(600_000);
   expect(rooms).toHaveBeenCalledTimes(1);
   expect(tournaments).toHaveBeenCalledTimes(1);
   expect(root.textContent).toContain(t().faults.byReason.JOIN_CODE_WRONG);
@@ -75,7 +61,7 @@ test("while the server is away, the room that was found stays, and one that was 
   await opened();
   expect(root.querySelector("form")).not.toBeNull();
   expect(root.querySelector('[data-part~="join-room"]')).toBeNull();
-  await pass(60_000);
+  await later(60_000);
   expect(root.querySelector('[data-part~="join-room"]')?.textContent).toContain("Table one");
 });
 
@@ -91,7 +77,7 @@ test("a name that a join without an answer may have taken is tried again, any ot
     create(ParticipantSchema, { seat: 2, name: "Bo" }),
   );
   rooms.mockResolvedValue(taken);
-  await pass(10_000);
+  await later(10_000);
   await enter("Bo");
   expect(join).toHaveBeenCalledTimes(1);
   await enter("Ada");
@@ -100,18 +86,15 @@ test("a name that a join without an answer may have taken is tried again, any ot
 
 /** Enters a text in the first field, and sends it. */
 async function enter(text: string) {
-  const input = root.querySelector("input");
-  if (!input) throw new Error("there is no field");
-  input.value = text;
-  await act(() => void input.dispatchEvent(new Event("input", { bubbles: true })));
+  await type(root.querySelector("input"), text);
   await act(() => root.querySelector<HTMLElement>("form button")?.click());
-  await pass(0);
+  await later(0);
 }
 
 test("a pasted link is followed, with what it brings, and no code is asked for", async () => {
   const asked = vi.spyOn(roomApi, "getRoom");
   const followed = vi.spyOn(location, "assign").mockReturnValue();
-  await act(() => render(<Join route={{ page: "join", code: "" }} />, root));
+  await mount(<Join route={{ page: "join", code: "" }} />);
   await enter(`https://example.org/rooms/${ID}#seat=secret`);
   expect(followed.mock.calls).toEqual([[`/rooms/${ID}#seat=secret`]]);
   await enter("https://example.org/else/where#secret");
@@ -126,8 +109,8 @@ async function openTournament(search: string) {
   vi.spyOn(tournamentApi, "followTournament").mockImplementation(() => {
     throw refused("TOURNAMENT_UNKNOWN");
   });
-  await act(() => render(<TournamentPage route={{ page: "tournament", tournamentId: ID }} />, root));
-  await pass(0);
+  await mount(<TournamentPage route={{ page: "tournament", tournamentId: ID }} />);
+  await later(0);
 }
 
 test("a private tournament is shown to those who bring its code, who can join it", async () => {
@@ -143,9 +126,9 @@ test("without a code, or with a wrong one, a private tournament is not shown", a
   await openTournament("");
   expect(asked).not.toHaveBeenCalled();
   expect(root.textContent).toContain(t().faults.byReason.TOURNAMENT_UNKNOWN);
-  await act(() => render(null, root));
+  await mount(null);
   await openTournament(`?code=${CODE}`);
-  await pass(600_000);
+  await later(600_000);
   expect(asked).toHaveBeenCalledTimes(1);
   expect(root.textContent).toContain(t().faults.byReason.JOIN_CODE_WRONG);
 });

@@ -1,6 +1,5 @@
 // The keys of the table: which cards they pick, and what they play.
 
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, describe, expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
@@ -12,8 +11,8 @@ import { cardsFromNumbers } from "../src/table/model/cards";
 import type { OpenDecision } from "../src/table/model/live";
 import { heldPlays, type Picked, pickedMove, pressFace, pressJoker } from "../src/table/model/picking";
 import { TableView } from "../src/table/view/TableView";
-import { root } from "./mounted";
-import { DEALT, stateOf } from "./table-state";
+import { mount, root } from "./mounted";
+import { DEALT, decisionOf, stateOf } from "./table-state";
 
 const FACES = 11;
 const JOKER = FACES + 1;
@@ -80,23 +79,17 @@ describe("picking", () => {
 describe("at the table", () => {
   afterEach(() => setPreference("keys", true));
 
-  const decision = (kind: DecisionKind, moves: readonly Move[]) =>
-    ({
-      id: 7n,
-      kind,
-      hand: HAND,
-      legal: moves.map((move) => actionOf(move, FACES)),
-      timeLeftMs: 0,
-      bankLeftMs: 0,
-      receivedAtMs: 0,
-    }) as unknown as OpenDecision;
+  const decision = (kind: DecisionKind, moves: readonly Move[]) => {
+    const legal = moves.map((move) => actionOf(move, FACES));
+    return decisionOf(HAND, legal, { kind });
+  };
   const TURN = decision(DecisionKind.TURN, [play(9, 2), play(9, 3), play(9, 1, 1), play(3, 1, 1), { kind: "pass" }]);
 
   const show = async (open: OpenDecision) => {
     const answers: number[] = [];
     const table = { ...tableOf(stateOf({ observation: DEALT })), phase: "pizza" as const, faces: FACES };
     const props = { table, own: 2, decision: open, untimed: true, onAnswer: (action: number) => answers.push(action) };
-    await act(() => render(<TableView {...props} />, root));
+    await mount(<TableView {...props} />);
     return answers;
   };
   const press = (key: string, on: EventTarget = document.activeElement ?? document.body) =>

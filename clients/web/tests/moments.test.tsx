@@ -1,7 +1,6 @@
 // Special moments: which events are one, and that they are shown once, with what they mean.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, expect, test, vi } from "vitest";
 import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
@@ -14,7 +13,7 @@ import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
 import { Moment } from "../src/table/view/Moment";
 import { Travel } from "../src/table/view/Travel";
-import { eventually, root } from "./mounted";
+import { eventually, mount, root } from "./mounted";
 import { RECORDS, recorded } from "./record";
 import { stateOf } from "./table-state";
 
@@ -34,11 +33,7 @@ const gift = (giver: number, receiver: number): Kind => {
   return { case: "cardsExchanged", value: { giver, receiver, count: 2 } };
 };
 
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  setPreference("moments", true);
-});
+afterEach(() => setPreference("moments", true));
 
 test.each<[string, Kind[], string | undefined]>([
   ["the Golden card opens a Shift", [deal, play(1, 11, 2, 15)], "opening"],
@@ -60,7 +55,7 @@ test("only the first gift of an exchange is a moment", () => {
 
 test("gifts travel until they have arrived, also when the next ones come meanwhile", async () => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
-  const show = (table: TableState) => act(() => render(<Travel table={table} own={0} dealt={false} />, root));
+  const show = (table: TableState) => mount(<Travel table={table} own={0} dealt={false} />);
   const underWay = () => root.querySelectorAll('[data-part~="under-way"]').length;
   const later = (ms: number) => act(() => void vi.advanceTimersByTime(ms));
   let table = played(start(), deal);
@@ -100,7 +95,7 @@ test("a moment is shown for a while; the past of a table is not", async () => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
   const dealt = played(start(), deal);
   const opened = played(dealt, play(1, 11, 2, 15));
-  const show = (table: TableState) => act(() => render(<Moment table={table} />, root));
+  const show = (table: TableState) => mount(<Moment table={table} />);
   const shown = () => root.querySelector('[data-part~="moment"]')?.textContent;
   await show(opened);
   expect(shown()).toBeUndefined();
@@ -130,8 +125,8 @@ test.each([
   ],
 ])("the points %s are read out", async (_, kinds, expected) => {
   const dealt = played(start(), deal);
-  await act(() => render(<Heard table={dealt} />, root));
-  await act(() => render(<Heard table={played(dealt, ...kinds)} />, root));
+  await mount(<Heard table={dealt} />);
+  await mount(<Heard table={played(dealt, ...kinds)} />);
   const heard = () => root.querySelector('[role="status"]')?.textContent ?? "";
   await eventually(() => expect(heard()).toMatch(expected));
   expect(heard().match(/\d points?/g)).toEqual(["5 points", "3 points", "1 point", "0 points"]);
@@ -139,8 +134,8 @@ test.each([
 
 test("what a moment means is read out after who played", async () => {
   const dealt = played(start(), deal);
-  await act(() => render(<Heard table={dealt} />, root));
-  await act(() => render(<Heard table={played(dealt, play(1, 11, 2, 15))} />, root));
+  await mount(<Heard table={dealt} />);
+  await mount(<Heard table={played(dealt, play(1, 11, 2, 15))} />);
   const heard = () => root.querySelector('[role="status"]')?.textContent;
   await eventually(() => expect(heard()).toMatch(/^Bo plays .*\. It opens the Shift\.$/));
 });
@@ -148,7 +143,7 @@ test("what a moment means is read out after who played", async () => {
 test("a last card is no longer announced once it has been played", async () => {
   const dealt = played(start(), deal, play(1, 11, 2, 15));
   const last = played(dealt, play(2, 9, 2, 1));
-  const show = (table: TableState) => act(() => render(<Moment table={table} />, root));
+  const show = (table: TableState) => mount(<Moment table={table} />);
   for (const table of [dealt, last]) await show(table);
   expect(root.textContent).toContain("Cleo has one card left");
   await show(played(last, play(2, 8, 1, 0)));
@@ -158,8 +153,8 @@ test("a last card is no longer announced once it has been played", async () => {
 test("moments can be switched off", async () => {
   setPreference("moments", false);
   const dealt = played(start(), deal);
-  await act(() => render(<Moment table={dealt} />, root));
-  await act(() => render(<Moment table={played(dealt, play(1, 11, 2, 15))} />, root));
+  await mount(<Moment table={dealt} />);
+  await mount(<Moment table={played(dealt, play(1, 11, 2, 15))} />);
   expect(root.querySelector('[data-part~="moment"]')).toBeNull();
 });
 

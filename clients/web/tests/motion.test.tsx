@@ -1,16 +1,15 @@
 // Cards that are dealt, laid and swept: what moves when, and that nothing of it stays.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
 import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
 import { useDealt } from "../src/table/view/arrivals";
 import { Board } from "../src/table/view/Board";
 import { Travel } from "../src/table/view/Travel";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { stateOf } from "./table-state";
 
 type Kind = NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>;
@@ -30,7 +29,7 @@ const happens = (...kinds: Kind[]) => {
     create(GameEventSchema, { sequence: BigInt(table.nextSequence + index), kind }),
   );
   table = applyEvents(table, events);
-  return act(() => render(<Table table={table} />, root));
+  return mount(<Table table={table} />);
 };
 const later = (ms: number) => act(() => void vi.advanceTimersByTime(ms));
 const count = (part: string) => root.querySelectorAll(`[data-part~="${part}"]`).length;
@@ -43,9 +42,8 @@ const pass = (seat: number): Kind => ({ case: "pass", value: { seat } });
 beforeEach(async () => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
   table = emptyTable((stateOf().room?.seats ?? []).map(seatFromParticipant));
-  await act(() => render(<Table table={table} />, root));
+  await mount(<Table table={table} />);
 });
-afterEach(() => vi.useRealTimers());
 
 test("a deal goes to every seat but the reader's, whose hand shows it, and arrives", async () => {
   await happens(deal);

@@ -1,14 +1,23 @@
-// Where component tests render: an element in the page, new for each test. A file that imports `root` has the hooks.
+// Where component tests render: an element in the page, new for each test. A file that imports this has the hooks.
 
-import { render } from "preact";
+import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, vi } from "vitest";
 import { startLanguage } from "../src/i18n";
 
 export let root: HTMLElement;
 
+/** Shows something, in place of what was there. */
+export const mount = (shown: ComponentChild) => act(() => render(shown, root));
+
 /** Lets the page process the responses that fakes have given. */
 export const settle = () => act(() => new Promise<void>((resolve) => setTimeout(resolve)));
+
+/** Lets time pass, by fake timers. */
+export const later = (ms: number) =>
+  act(async () => {
+    await vi.advanceTimersByTimeAsync(ms);
+  });
 
 /** Waits until a check passes, as long as a busy machine may take to load a language. */
 export const eventually = (check: () => void) => vi.waitFor(check, { timeout: 30_000 });
@@ -23,6 +32,12 @@ export async function press(words: string) {
   if (!found) throw new Error(`no button "${words}"`);
   await act(() => found.click());
   await settle();
+}
+
+/** The field with a label. */
+export function fieldOf(label: string) {
+  const found = [...root.querySelectorAll("label")].find(({ textContent }) => textContent === label);
+  return root.querySelector<HTMLInputElement>(`[id="${found?.htmlFor}"]`);
 }
 
 /** Types a text into a field, in place of what it had. */
@@ -41,6 +56,6 @@ beforeEach(async () => {
 });
 
 afterEach(async () => {
-  await act(() => render(null, root));
+  await mount(null);
   root.remove();
 });

@@ -1,18 +1,13 @@
 // The key of this device's names: made once, or entered from another device.
 
 import { create } from "@bufbuild/protobuf";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { JoinRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { heldSeat, lastName, takeSeat } from "../src/lobby/seat";
 import { isNameKey, NO_KEY, nameKey, nameKeyText, setNameKey } from "../src/name-key";
 import { forgetAll, remember } from "../src/store";
-
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
-});
 
 test("a key is made the first time, and kept", () => {
   expect(nameKeyText()).toBeNull();

@@ -2,18 +2,17 @@
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { type ComponentChild, render } from "preact";
-import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import type { ComponentChild } from "preact";
+import { beforeEach, expect, test, vi } from "vitest";
 import { serverApi } from "../src/api/client";
 import { GetServerInfoResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import { NewRoom } from "../src/lobby/NewRoom";
-import { forgetAll, remember } from "../src/store";
+import { remember } from "../src/store";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
 import { NewTournament } from "../src/tournaments/NewTournament";
 import { Organiser } from "../src/tournaments/Organiser";
-import { root, settle } from "./mounted";
+import { later, mount, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const AGENTS = ["greedy", "random", "random_unmasked", "search", "trained"];
@@ -26,10 +25,6 @@ beforeEach(() => {
       quickBuiltInAgents: AGENTS.filter((agent) => agent !== "search"),
     }),
   );
-});
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 const organised = {
@@ -52,7 +47,7 @@ const PAGES: [string, () => ComponentChild][] = [
 
 test.each(PAGES)("%s", async (_, page) => {
   remember(`organised.${ID}`, JSON.stringify({ joinCode: "ABCD", ownerToken: "cd".repeat(48) }));
-  await act(() => render(page(), root));
+  await mount(page());
   await settle();
   // A list with every other agent is there.
   const options = [...root.querySelectorAll("option")].map(({ value, textContent }) => `${value} ${textContent}`);
@@ -78,15 +73,11 @@ test("a form that was opened while the server was away gets its fields when it i
         builtInAgents: AGENTS,
       }),
     );
-  const pass = (ms: number) =>
-    act(async () => {
-      await vi.advanceTimersByTimeAsync(ms);
-    });
-  await act(() => render(<NewRoom />, root));
-  await pass(0);
+  await mount(<NewRoom />);
+  await later(0);
   expect(root.querySelector('[role="alert"]')).not.toBeNull();
   expect(root.querySelector("form")).toBeNull();
-  await pass(60_000);
+  await later(60_000);
   expect(root.querySelector('[role="alert"]')).toBeNull();
   expect(root.querySelector("form")).not.toBeNull();
   vi.useRealTimers();

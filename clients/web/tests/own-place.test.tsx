@@ -2,9 +2,7 @@
 // countdown to the start.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
-import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { serverApi, tournamentApi } from "../src/api/client";
 import { GetClockResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import {
@@ -20,23 +18,10 @@ import {
 } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { Countdown, clockOf } from "../src/tournaments/Countdown";
 import { nextOf, OwnPlace } from "../src/tournaments/OwnPlace";
-import {
-  decidePlace,
-  forgetPlace,
-  type HeldPlace,
-  heldPlace,
-  linkToPlace,
-  placeFromLink,
-} from "../src/tournaments/place";
-import { button, press, root, settle } from "./mounted";
+import { decidePlace, type HeldPlace, heldPlace, linkToPlace, placeFromLink } from "../src/tournaments/place";
+import { button, later, mount, press, root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
-
-beforeEach(() => forgetPlace(ID));
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
 
 const BO: HeldPlace = { ticket: `${ID}${"ab".repeat(32)}`, participant: 3, name: "Bo & Çem" };
 const ADA: HeldPlace = { ticket: `${ID}${"cd".repeat(32)}`, participant: 1, name: "Ada" };
@@ -113,7 +98,7 @@ async function showPlace(state: TournamentState, games: { game: number; state: T
   const postpone = vi.spyOn(tournamentApi, "postponeGame").mockResolvedValue(create(PostponeGameResponseSchema));
   const onLeft = vi.fn();
   const live = { tournament: create(TournamentSchema, { tournamentId: ID, state }), standings: [], games: [] };
-  await act(() => render(<OwnPlace held={BO} live={live} onLeft={onLeft} />, root));
+  await mount(<OwnPlace held={BO} live={live} onLeft={onLeft} />);
   await settle();
   return { leave, postpone, onLeft };
 }
@@ -177,10 +162,8 @@ test("the countdown runs by the server's clock", async () => {
   });
   const settings = { startAtMs: 1_030_000n };
   const tournament = create(TournamentSchema, { state: TournamentState.OPEN, settings });
-  await act(() => render(<Countdown tournament={tournament} />, root));
-  await act(async () => {
-    await vi.advanceTimersByTimeAsync(40_000);
-  });
+  await mount(<Countdown tournament={tournament} />);
+  await later(40_000);
   expect(root.querySelector('[role="timer"]')?.textContent).toBe("Starts in 9:50");
 });
 
@@ -188,19 +171,15 @@ test("the countdown runs to the start, and only before it", async () => {
   vi.spyOn(serverApi, "getClock").mockRejectedValue(new Error("no server"));
   vi.useFakeTimers({ now: 1_000_000 });
   const show = (state: TournamentState, startAtMs: bigint) =>
-    act(() => render(<Countdown tournament={create(TournamentSchema, { state, settings: { startAtMs } })} />, root));
+    mount(<Countdown tournament={create(TournamentSchema, { state, settings: { startAtMs } })} />);
   const shown = () => root.querySelector('[role="timer"]')?.textContent;
   await show(TournamentState.OPEN, 0n);
   expect(root.textContent).toBe("");
   await show(TournamentState.OPEN, 1_065_000n);
   expect(shown()).toBe("Starts in 1:05");
-  await act(async () => {
-    await vi.advanceTimersByTimeAsync(60_000);
-  });
+  await later(60_000);
   expect(shown()).toBe("Starts in 0:05");
-  await act(async () => {
-    await vi.advanceTimersByTimeAsync(5_000);
-  });
+  await later(5_000);
   expect(shown()).toBeUndefined();
   expect(root.textContent).not.toBe("");
   await show(TournamentState.PLAYING, 1_065_000n);

@@ -4,9 +4,8 @@ import { readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import { beforeAll, expect, test, vi } from "vitest";
 import { serverApi } from "../src/api/client";
 import { AbortPolicy, ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { PassScope } from "../src/gen/chefshat/v1/rules_pb";
@@ -36,7 +35,6 @@ import {
 import { setLanguage, startLanguage, t } from "../src/i18n";
 import { zipped } from "../src/parts/zip";
 import { navigate, route } from "../src/router";
-import { forgetAll } from "../src/store";
 import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { NewStudyPage } from "../src/studies/NewStudyPage";
@@ -46,17 +44,13 @@ import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
-import { button, eventually, press, root, settle, type } from "./mounted";
+import { button, eventually, fieldOf, mount, press, root, settle, type } from "./mounted";
 import { refused } from "./refusals";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TOKEN = "ab".repeat(48);
 
 beforeAll(startLanguage);
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
-});
 
 const study = create(StudySchema, {
   studyId: ID,
@@ -258,7 +252,7 @@ test.each([
 
 test("removing the last question moves the focus to the button that adds one", async () => {
   vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await act(() => render(<NewStudyPage />, root));
+  await mount(<NewStudyPage />);
   await settle();
   const removing = () =>
     [...root.querySelectorAll("button")].filter((one) => one.textContent?.startsWith("Remove this question"));
@@ -274,12 +268,9 @@ test("removing the last question moves the focus to the button that adds one", a
 
 test("a number with letters is not taken for an empty field", async () => {
   vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await act(() => render(<NewStudyPage />, root));
+  await mount(<NewStudyPage />);
   await settle();
-  const label = [...root.querySelectorAll("label")].find(
-    ({ textContent }) => textContent === t().studies.make.minWidth,
-  );
-  const width = root.querySelector<HTMLInputElement>(`[id="${label?.htmlFor}"]`);
+  const width = fieldOf(t().studies.make.minWidth);
   await type(width, "1024px");
   await press(t().studies.make.submit);
   expect(width?.getAttribute("aria-invalid")).toBe("true");
@@ -314,7 +305,7 @@ test("those of a study with groups may be added together, in whole groups", asyn
     participant(1, StudyParticipantState.LEFT_OVER, []),
     create(StudyParticipantSchema, { number: 2, pseudonym: "P02", state: StudyParticipantState.ACTIVE, group: 7 }),
   ];
-  await act(() => render(<OwnStudy study={inPairs} participants={paired} onChanged={changed} />, root));
+  await mount(<OwnStudy study={inPairs} participants={paired} onChanged={changed} />);
   expect(root.querySelector('[data-part="conditions"]')?.textContent).toContain("left over");
   expect(root.querySelector('[data-part="participants"]')?.textContent).toContain("group 7");
   const form = root.querySelector('[data-part="add-participants"]');
@@ -347,7 +338,7 @@ test("the settings of a study make a file that gives the same ones", async () =>
 test("the device that a study needs is said", async () => {
   const settings = { participants: 8, device: { pointer: StudyPointer.FINE, minWidth: 1024 } };
   const needing = create(StudySchema, { studyId: ID, settings });
-  await act(() => render(<OwnStudy study={needing} participants={[]} onChanged={changed} />, root));
+  await mount(<OwnStudy study={needing} participants={[]} onChanged={changed} />);
   expect(root.textContent).toContain(
     "Device that participants need: computer. Least width of the page, in pixels: 1024",
   );
@@ -465,7 +456,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   const erase = vi
     .spyOn(studyApi, "deleteStudyParticipant")
     .mockResolvedValue(create(DeleteStudyParticipantResponseSchema));
-  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
+  await mount(<OwnStudy study={study} participants={participants} onChanged={changed} />);
   expect(root.textContent).toContain("1 of 8 completed");
   const rows = [...root.querySelectorAll('[data-part="participants"] tbody tr')];
   expect(rows.map((row) => row.querySelectorAll("td")[2]?.textContent)).toEqual([
@@ -487,9 +478,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   });
   // They stay when somebody joins.
   const joined = create(StudyParticipantSchema, { number: 4, pseudonym: "P04" });
-  await act(() =>
-    render(<OwnStudy study={study} participants={[...participants, joined]} onChanged={changed} />, root),
-  );
+  await mount(<OwnStudy study={study} participants={[...participants, joined]} onChanged={changed} />);
   expect(root.querySelector('[data-part="links"]')?.textContent).toContain(`/study/${link}`);
 
   // The first row has ended: it can only be deleted.
@@ -499,7 +488,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   expect(erase.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, number: 1 });
   await press("Remove…");
   await press("Remove now");
-  expect(remove.mock.calls[0]?.[0]).toMatchObject({ number: 2, replace: false });
+  expect(remove.mock.calls[0]?.[0]).toEqual({ studyId: ID, ownerToken: TOKEN, number: 2 });
 });
 
 const OTHER = "0123456789abcdef0123456789abcdef";
@@ -510,7 +499,7 @@ test("a study is deleted after a confirmation, and this device forgets its key",
   keepOwnerToken(OTHER, OTHER_TOKEN);
   navigate({ page: "ownStudy", studyId: ID });
   const erase = vi.spyOn(studyApi, "deleteStudy").mockResolvedValue(create(DeleteStudyResponseSchema));
-  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
+  await mount(<OwnStudy study={study} participants={participants} onChanged={changed} />);
   await press("Delete the study…");
   expect(root.querySelector('[data-part="question"]')?.textContent).toMatch(/cannot be restored/);
   await press("Cancel");
@@ -522,7 +511,7 @@ test("a study is deleted after a confirmation, and this device forgets its key",
   expect(route.value).toEqual({ page: "studies" });
 
   const list = vi.spyOn(studyApi, "listStudies").mockResolvedValue(create(ListStudiesResponseSchema));
-  await act(() => render(<StudiesPage />, root));
+  await mount(<StudiesPage />);
   expect(list.mock.calls[0]?.[0]).toEqual({ ownerTokens: [OTHER_TOKEN] });
 });
 
@@ -548,7 +537,7 @@ test("participants in the middle of a study are removed only after the server ha
     if (!force) throw refused("STUDY_RUNNING");
     return create(DeleteStudyResponseSchema);
   });
-  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
+  await mount(<OwnStudy study={study} participants={participants} onChanged={changed} />);
   expect(button("Remove the participants and delete…")).toBeUndefined();
   await press("Delete the study…");
   await press("Delete everything now");
@@ -566,7 +555,7 @@ test("participants in the middle of a study are removed only after the server ha
 test("a study that cannot be deleted stays, and says why", async () => {
   keepOwnerToken(ID, TOKEN);
   vi.spyOn(studyApi, "deleteStudy").mockRejectedValue(refused("STORE_FAILED", Code.Unavailable));
-  await act(() => render(<OwnStudy study={study} participants={participants} onChanged={changed} />, root));
+  await mount(<OwnStudy study={study} participants={participants} onChanged={changed} />);
   await press("Delete the study…");
   await press("Delete everything now");
   expect(root.querySelector('[role="alert"]')).not.toBeNull();
@@ -576,7 +565,7 @@ test("a study that cannot be deleted stays, and says why", async () => {
 
 test("a form with wrong fields says so beside its button, and goes to the first of them each time", async () => {
   vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await act(() => render(<NewStudyPage />, root));
+  await mount(<NewStudyPage />);
   await settle();
   const form = root.querySelector('[data-part="study-form"]');
   expect(form?.querySelector('[role="alert"]')).toBeNull();
@@ -600,7 +589,7 @@ test("a closed study is shown whole, and a deletion in it as soon as it is done"
   vi.spyOn(studyApi, "deleteStudyParticipant").mockResolvedValue(
     create(DeleteStudyParticipantResponseSchema, { participant: left }),
   );
-  await act(() => render(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />, root));
+  await mount(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />);
   await settle();
   const rows = () => [...root.querySelectorAll('[data-part="participants"] tbody tr')];
   await eventually(() => expect(rows().length).toBe(3));
@@ -617,7 +606,7 @@ test("a key of another study is not taken, and one that the server does not know
     if (ownerToken !== right) throw refused("STUDY_UNKNOWN", Code.NotFound);
     yield create(FollowStudyResponseSchema, { study: { ...study, closed: true }, participants });
   });
-  await act(() => render(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />, root));
+  await mount(<OwnStudyPage route={{ page: "ownStudy", studyId: ID }} />);
   await eventually(() => expect(button("Use this key")).toBeDefined());
   await type(root.querySelector("input"), OTHER_TOKEN);
   await press("Use this key");

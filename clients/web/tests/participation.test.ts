@@ -3,7 +3,7 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { beforeAll, beforeEach, expect, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
 import {
   DetachReason,
@@ -12,7 +12,7 @@ import {
 } from "../src/gen/chefshat/v1/play_service_pb";
 import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { setLanguage } from "../src/i18n";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { refusedWords } from "../src/table/words";
 import { startParticipation } from "../src/tournaments/participation";
 import { AWAY } from "./refusals";
@@ -27,13 +27,7 @@ const seated: Update = {
 };
 
 beforeAll(() => setLanguage("en"));
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** A stream that sends messages at these times, in milliseconds from its start, and stays open. */
 function streaming(said: readonly (readonly [atMs: number, update: Update])[]) {

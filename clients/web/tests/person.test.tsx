@@ -2,9 +2,8 @@
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { recordApi, tournamentApi } from "../src/api/client";
 import { tableOf } from "../src/attend/words";
 import { ListRecordsResponseSchema, RecordSummarySchema } from "../src/gen/chefshat/v1/record_service_pb";
@@ -15,13 +14,11 @@ import { MAX_LINES } from "../src/people/games";
 import { LeaderboardPage } from "../src/people/LeaderboardPage";
 import { PersonPage } from "../src/people/PersonPage";
 import { Result } from "../src/table/view/Result";
-import { root, settle } from "./mounted";
+import { mount, root, settle } from "./mounted";
 import { stateOf } from "./table-state";
 
 const NAME = '<b>Dr. "Rösa"/II</b> & ?#%';
 const PER_PAGE = 50;
-
-afterEach(() => vi.restoreAllMocks());
 
 const line = (name: string, kind = ParticipantKind.HUMAN, nameFingerprint = "") =>
   create(RatedSchema, { name, kind, nameFingerprint, place: 3, rating: { mean: 30, deviation: 2.5, games: 12 } });
@@ -55,7 +52,7 @@ async function show(records: ReturnType<typeof record>[], rated: Rated[], finger
     return create(ListRecordsResponseSchema, { records: records.slice(from, to), nextPageToken });
   });
   vi.spyOn(tournamentApi, "getLeaderboard").mockResolvedValue(create(GetLeaderboardResponseSchema, { rated }));
-  await act(() => render(<PersonPage route={{ page: "person", name: NAME, fingerprint }} />, root));
+  await mount(<PersonPage route={{ page: "person", name: NAME, fingerprint }} />);
   await settle();
   return list;
 }
@@ -134,7 +131,7 @@ test("the leaderboard shows more on request, and says where it ends", async () =
   vi.spyOn(tournamentApi, "getLeaderboard").mockImplementation(async ({ limit }) =>
     create(GetLeaderboardResponseSchema, { rated: all.slice(0, limit), games: 1n }),
   );
-  await act(() => render(<LeaderboardPage />, root));
+  await mount(<LeaderboardPage />);
   await settle();
   expect(rows()).toHaveLength(200);
   const more = () => root.querySelector("button");
@@ -173,7 +170,7 @@ test("it says that it is loading, and why it failed", async () => {
   });
   vi.spyOn(recordApi, "listRecords").mockReturnValue(response);
   vi.spyOn(tournamentApi, "getLeaderboard").mockReturnValue(response);
-  await act(() => render(<PersonPage route={{ page: "person", name: NAME, fingerprint: "" }} />, root));
+  await mount(<PersonPage route={{ page: "person", name: NAME, fingerprint: "" }} />);
   expect(root.textContent).toContain("Loading…");
   fail(new ConnectError("no such server", Code.Unavailable));
   await settle();
@@ -185,9 +182,9 @@ test("the result of a replay leads to the players, that of a game in progress do
   const dealt = tableOf(stateOf());
   const standings = dealt.seats.map(({ seat }) => ({ seat, points: 0, place: seat + 1 }));
   const table = { ...dealt, phase: "gameOver" as const, standings };
-  await act(() => render(<Result table={table} own={undefined} links={false} />, root));
+  await mount(<Result table={table} own={undefined} links={false} />);
   expect(link("Ada")?.getAttribute("href")).toBe("/people/Ada");
-  await act(() => render(<Result table={table} own={undefined} />, root));
+  await mount(<Result table={table} own={undefined} />);
   expect(link("Ada")).toBeUndefined();
 });
 
@@ -198,6 +195,6 @@ test.each([
   const dealt = tableOf(stateOf());
   const seats = dealt.seats.map((seat) => ({ ...seat, name: names[seat.seat] ?? "" }));
   const standings = seats.map(({ seat }) => ({ seat, points: 0, place: seat + 1 }));
-  await act(() => render(<Result table={{ ...dealt, seats, phase: "gameOver", standings }} own={3} />, root));
+  await mount(<Result table={{ ...dealt, seats, phase: "gameOver", standings }} own={3} />);
   expect(root.querySelector("h2")?.textContent).toBe(words);
 });

@@ -1,14 +1,13 @@
 // Quick phrases: sent as an id and a text, shown in the reader's language. Where the room allows it, people
 // write lines of their own.
 
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { type Gesture, PHRASES, type Phrase, phraseGesture, phraseOf, shownLabel } from "../src/table/expressions";
 import { Expressions } from "../src/table/view/Tools";
-import { root, type } from "./mounted";
+import { mount, root, type } from "./mounted";
 
 /** The longest label that the protocol allows, bytes. */
 const MAX_LABEL = 64;
@@ -39,7 +38,7 @@ async function opened(phrases: boolean, chat: boolean, arrives = () => true): Pr
     said.push(gesture);
     return arrives();
   };
-  await act(() => render(<Expressions phrases={phrases} chat={chat} onExpress={onExpress} />, root));
+  await mount(<Expressions phrases={phrases} chat={chat} onExpress={onExpress} />);
   await speak();
   return said;
 }

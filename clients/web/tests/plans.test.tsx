@@ -2,10 +2,8 @@
 // by itself.
 
 import { signal } from "@preact/signals";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { beforeEach, expect, test, vi } from "vitest";
 import type { Acting } from "../src/table/acting";
 import { passDelayMs, useAutoPass } from "../src/table/auto-pass";
 import { actionOf, type Move } from "../src/table/model/actions";
@@ -13,8 +11,8 @@ import { cardsFromNumbers, playedCards } from "../src/table/model/cards";
 import { type OpenDecision, startLive } from "../src/table/model/live";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
 import { TableView } from "../src/table/view/TableView";
-import { root } from "./mounted";
-import { SEATS, stateOf } from "./table-state";
+import { mount, root } from "./mounted";
+import { decisionOf, SEATS, stateOf } from "./table-state";
 
 const FACES = 11;
 const OWN = 0;
@@ -24,7 +22,6 @@ const PASS: Move = { kind: "pass" };
 const action = (move: Move) => actionOf(move, FACES);
 
 beforeEach(() => vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] }));
-afterEach(() => vi.useRealTimers());
 
 /** Others decide while 9s lie on the board. */
 function table(changed: Partial<TableState> = {}): TableState {
@@ -38,21 +35,12 @@ function table(changed: Partial<TableState> = {}): TableState {
   return { ...emptyTable(seats), phase: "pizza", shift: 1, pizza: 1, turn: 5, board, boardBy: 1, next: 2, ...changed };
 }
 
-const turn = (...moves: Move[]) =>
-  ({
-    id: 7n,
-    kind: DecisionKind.TURN,
-    hand: HAND,
-    legal: moves.map(action),
-    timeLeftMs: 0,
-    bankLeftMs: 0,
-    receivedAtMs: 0,
-  }) as unknown as OpenDecision;
+const turn = (...moves: Move[]) => decisionOf(HAND, moves.map(action));
 
 let answers: [number, string | undefined][] = [];
 const show = (table: TableState, decision?: OpenDecision, plans = true) => {
   const onAnswer = (action: number, automatic?: string) => answers.push([action, automatic]);
-  return act(() => render(<TableView {...{ table, decision, plans, onAnswer }} own={OWN} untimed />, root));
+  return mount(<TableView {...{ table, decision, plans, onAnswer }} own={OWN} untimed />);
 };
 const button = (id: string) => root.querySelector<HTMLButtonElement>(`[data-action="${id}"]`);
 const click = (id: string) => act(() => button(id)?.click());
@@ -181,7 +169,7 @@ test.each([
   const answer = (action: number, automatic?: string) => answers.push([action, automatic]);
   const acting = { live, answer } as unknown as Acting;
   const AutoPass = () => <>{String(useAutoPass(acting, on))}</>;
-  await act(() => render(<AutoPass />, root));
+  await mount(<AutoPass />);
   expect(root.textContent).toBe(String(expected.length > 0));
   await act(() => void vi.advanceTimersByTime(1000));
   expect(answers).toEqual([]);

@@ -2,49 +2,32 @@
 // page is gone.
 
 import { Code } from "@connectrpc/connect";
-import { render } from "preact";
-import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { type Polled, usePolled } from "../src/api/poll";
+import { later, mount } from "./mounted";
 import { AWAY, tooMany } from "./refusals";
 
 const EVERY_MS = 1000;
-let root: HTMLElement;
 let seen: Polled<number> | undefined;
 
-beforeEach(() => {
-  vi.useFakeTimers();
-  root = document.createElement("div");
-});
-
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 async function shown(ask: (signal: AbortSignal) => Promise<number>, key = "one") {
   function Page() {
     seen = usePolled(ask, EVERY_MS, key);
     return null;
   }
-  await act(() => render(<Page />, root));
-}
-
-async function pass(ms: number) {
-  await act(async () => {
-    await vi.advanceTimersByTimeAsync(ms);
-  });
+  await mount(<Page />);
 }
 
 test("the latest response is shown, requested at once and at the interval", async () => {
   let answer = 0;
   await shown(async () => ++answer);
-  await pass(0);
+  await later(0);
   expect(seen?.value).toBe(1);
-  await pass(EVERY_MS - 1);
+  await later(EVERY_MS - 1);
   expect(seen?.value).toBe(1);
-  await pass(1);
+  await later(1);
   expect(seen?.value).toBe(2);
 });
 
@@ -55,12 +38,12 @@ test("after an error the last response stays, and requests slow down until one s
     if (asked === 2) throw AWAY;
     return asked;
   });
-  await pass(EVERY_MS);
+  await later(EVERY_MS);
   expect(seen?.value).toBe(1);
   expect(seen?.fault?.code).toBe(Code.Unavailable);
-  await pass(EVERY_MS);
+  await later(EVERY_MS);
   expect(asked).toBe(2);
-  await pass(EVERY_MS);
+  await later(EVERY_MS);
   expect(seen).toEqual({ value: 3, fault: null });
 });
 
@@ -71,9 +54,9 @@ test("a limit that says when to try again is obeyed", async () => {
     if (asked === 1) throw tooMany(20 * EVERY_MS);
     return asked;
   });
-  await pass(19 * EVERY_MS);
+  await later(19 * EVERY_MS);
   expect(asked).toBe(1);
-  await pass(EVERY_MS);
+  await later(EVERY_MS);
   expect(seen).toEqual({ value: 2, fault: null });
 });
 
@@ -81,11 +64,11 @@ test("a hidden page makes no request, and makes one at once when it is shown aga
   const hidden = vi.spyOn(document, "hidden", "get").mockReturnValue(true);
   let asked = 0;
   await shown(async () => ++asked);
-  await pass(10 * EVERY_MS);
+  await later(10 * EVERY_MS);
   expect(asked).toBe(0);
   hidden.mockReturnValue(false);
   document.dispatchEvent(new Event("visibilitychange"));
-  await pass(0);
+  await later(0);
   expect(seen?.value).toBe(1);
 });
 
@@ -93,7 +76,7 @@ test("hiding and showing the page during a request does not repeat it", async ()
   let asked = 0;
   await shown(() => new Promise(() => (asked += 1)));
   document.dispatchEvent(new Event("visibilitychange"));
-  await pass(10 * EVERY_MS);
+  await later(10 * EVERY_MS);
   expect(asked).toBe(1);
 });
 
@@ -104,9 +87,9 @@ test("a page that is gone stops polling and aborts its request", async () => {
     signal = given;
     return ++asked;
   });
-  await pass(0);
-  await act(() => render(null, root));
-  await pass(10 * EVERY_MS);
+  await later(0);
+  await mount(null);
+  await later(10 * EVERY_MS);
   expect(asked).toBe(1);
   expect(signal?.aborted).toBe(true);
 });

@@ -1,12 +1,11 @@
 // Flapping connections: one line in the log, and one announcement for each change that lasts.
 
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { isPresence, visibleLines } from "../src/table/model/log";
 import type { LogEntry, LogLine } from "../src/table/model/state";
 import { createPresenceAnnouncer, SETTLED_MS } from "../src/table/presence";
 
 beforeEach(() => void vi.useFakeTimers());
-afterEach(() => void vi.useRealTimers());
 
 const lost = (seat: number): LogEntry => ({ kind: "lost", seat });
 const back = (seat: number): LogEntry => ({ kind: "back", seat });

@@ -2,25 +2,22 @@
 
 import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
-import { type ComponentChild, render } from "preact";
+import type { ComponentChild } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { StudyShownQuestionnaireSchema } from "../src/gen/chefshat/v1/study_pb";
 import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatted";
 import { WithPictures } from "../src/studies/Pictures";
 import type { ItemAnswer } from "../src/studies/participating";
 import { Questionnaire } from "../src/studies/Questionnaire";
-import { eventually, root, type } from "./mounted";
+import { eventually, mount, root, type } from "./mounted";
 import { AWAY, refused } from "./refusals";
 
 const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
 const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
 const GAMES = { case: "choice" as const, value: { options: ["cards", "chess"], multiple: true } };
 
-afterEach(() => act(() => render(null, root)));
-afterEach(() => void vi.useRealTimers());
-
-const show = (what: ComponentChild) => act(() => render(what, root));
+const show = (what: ComponentChild) => mount(what);
 const shownItems = () => [...root.querySelectorAll<HTMLElement>("[data-item]")].map(({ dataset }) => dataset.item);
 const field = (item: number, which = "input") => {
   const found = root.querySelector<HTMLInputElement>(`[data-item="${item}"] ${which}`);
@@ -239,7 +236,7 @@ test("what is still to be saved when the questionnaire is over is not saved in t
     await enter(0, age);
     await vi.advanceTimersByTimeAsync(500);
   }
-  await act(() => render(null, root));
+  await mount(null);
   fail(new Error("too late"));
   await vi.advanceTimersByTimeAsync(0);
   expect(saves).toEqual([[3, [20]]]);

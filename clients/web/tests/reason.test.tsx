@@ -1,15 +1,13 @@
 // The reason that an agent gave for its decision, in the replay.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
-import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { DecisionRecordSchema } from "../src/gen/chefshat/v1/record_pb";
 import { Decision } from "../src/replay/ReplayPage";
 import { actionOf } from "../src/table/model/actions";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
 const FACES = 11;
@@ -21,6 +19,6 @@ test.each([
   const table = { ...tableOf(stateOf({ observation: DEALT })), faces: FACES };
   const action = actionOf({ kind: "pass" }, FACES);
   const open = create(DecisionRecordSchema, { seat: 0, kind: DecisionKind.TURN, action, annotations: { extra } });
-  await act(() => render(<Decision table={table} open={open} />, root));
+  await mount(<Decision table={table} open={open} />);
   expect(root.querySelector('[data-part="reason"]')?.textContent).toBe(words);
 });

@@ -4,7 +4,7 @@
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, test } from "vitest";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 
 /** The crates of the server that name reasons. */
 const SERVER = ["admission", "gateway", "hosting", "store", "vector", "wire"].map((part) =>

@@ -2,13 +2,12 @@
 
 import { create, type DescMessage, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError, type UnaryRequest, type UnaryResponse } from "@connectrpc/connect";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { REQUEST_ID_BYTES, repeat } from "../src/api/repeat";
 import { ActRequestSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { GetRoomRequestSchema, JoinRoomRequestSchema } from "../src/gen/chefshat/v1/room_service_pb";
 
 beforeEach(() => void vi.useFakeTimers());
-afterEach(() => void vi.useRealTimers());
 
 /** Sends a message through the interceptor; each attempt fails with the next error. */
 async function send<Asked extends DescMessage>(input: Asked, init: MessageInitShape<Asked>, errors: ConnectError[]) {

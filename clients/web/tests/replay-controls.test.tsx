@@ -1,34 +1,29 @@
 // The controls of a replay: the perspectives that a record has.
 
-import { render } from "preact";
-import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import type { RecordLine } from "../src/gen/chefshat/v1/record_pb";
 import { Controls } from "../src/replay/Controls";
 import { filmOf } from "../src/replay/frames";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { recorded, withoutHands } from "./record";
 
 /** The choices of the cards shown. */
 async function perspectives(lines: readonly RecordLine[]): Promise<(string | null)[]> {
   const film = filmOf(lines);
   const nothing = () => {};
-  await act(() =>
-    render(
-      <Controls
-        film={film}
-        frame={film.at(0)}
-        at={0}
-        playing={false}
-        speed={1}
-        perspective="all"
-        onGo={nothing}
-        onPlaying={nothing}
-        onSpeed={nothing}
-        onPerspective={nothing}
-      />,
-      root,
-    ),
+  await mount(
+    <Controls
+      film={film}
+      frame={film.at(0)}
+      at={0}
+      playing={false}
+      speed={1}
+      perspective="all"
+      onGo={nothing}
+      onPlaying={nothing}
+      onSpeed={nothing}
+      onPerspective={nothing}
+    />,
   );
   const list = [...root.querySelectorAll("select")].find((select) => select.value === "all");
   return [...(list?.options ?? [])].map(({ textContent }) => textContent);

@@ -1,6 +1,5 @@
 // The result at the table: how long it stays, whose row is the reader's, the curve of a game's points.
 
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
@@ -10,7 +9,7 @@ import type { OpenDecision } from "../src/table/model/live";
 import type { TableState } from "../src/table/model/state";
 import { Result } from "../src/table/view/Result";
 import { TableView } from "../src/table/view/TableView";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
 const START: TableState = { ...tableOf(stateOf({ observation: DEALT })), phase: "pizza", shift: 2 };
@@ -31,7 +30,7 @@ const OVER: TableState = {
 };
 
 const show = (table: TableState, own: number | undefined, props: Partial<Parameters<typeof Result>[0]> = {}) =>
-  act(() => render(<Result table={table} own={own} {...props} />, root));
+  mount(<Result table={table} own={own} {...props} />);
 const PLAYING = { playing: true };
 const shown = () => root.querySelector("h2")?.textContent;
 const button = () => root.querySelector("button");
@@ -65,7 +64,7 @@ test("who leads the Shift closes it by the first card picked", async () => {
   const legal = [actionOf({ kind: "play", face: 11, quantity: 1, jokers: 0 }, 11)];
   const decision = { id: 7n, kind: DecisionKind.TURN, hand, legal, requirement: undefined } as unknown as OpenDecision;
   const dealt: TableState = { ...ENDED, faces: 11, phase: "dealt", seats };
-  await act(() => render(<TableView table={dealt} own={0} decision={decision} onAnswer={() => {}} />, root));
+  await mount(<TableView table={dealt} own={0} decision={decision} onAnswer={() => {}} />);
   expect(root.querySelector('[data-part~="result"] h2')?.textContent).toBe("Shift 1");
   await act(() => root.querySelector<HTMLElement>('[data-part~="hand-card"]')?.click());
   expect(root.querySelector('[data-part~="result"] h2')).toBeNull();

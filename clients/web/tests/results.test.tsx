@@ -1,9 +1,8 @@
 // The results of a tournament and its certificates, to print.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { tournamentApi } from "../src/api/client";
 import {
   TournamentFormat,
@@ -15,10 +14,9 @@ import {
 import { ListTournamentGamesResponseSchema } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { dateOf, setLanguage } from "../src/i18n";
 import { fileName } from "../src/parts/download";
-import { forgetAll } from "../src/store";
 import { certificatesOf } from "../src/tournaments/certificate";
 import { Results } from "../src/tournaments/ResultsPage";
-import { eventually, root } from "./mounted";
+import { eventually, mount, root } from "./mounted";
 
 const CREATED_MS = Date.UTC(2026, 2, 14, 12);
 const NAMES = ["Ada", "Bo & Çem", "greedy", "Zoë", "Łucja 你好"];
@@ -68,13 +66,9 @@ beforeEach(() => {
     create(ListTournamentGamesResponseSchema, { games }),
   );
 });
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
-});
 
 test("the page has standings, date, settings and the games that count", async () => {
-  await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
+  await mount(<Results live={{ tournament: tournament(), standings, games: [] }} />);
   await eventually(() => expect(root.textContent).toContain("1. Ada +3 · 2. Di +1"));
   expect(root.textContent).toContain("2026");
   expect(root.textContent).toContain("Swiss");
@@ -82,6 +76,17 @@ test("the page has standings, date, settings and the games that count", async ()
   // The void game is not listed.
   expect(root.textContent).toContain("Round 1");
   expect(root.textContent).not.toContain("Round 2");
+});
+
+test.each([
+  [TournamentState.PLAYING, "Standings"],
+  [TournamentState.FINISHED, "Final standings"],
+  // It was closed early: nobody has won.
+  [TournamentState.CLOSED, "Standings"],
+])("in state %i the standings and their table are called %j", async (state, title) => {
+  await mount(<Results live={{ tournament: tournament(state), standings, games: [] }} />);
+  const titles = [...root.querySelectorAll('section:has([data-part~="standings"]) > h2, caption')];
+  expect(titles.slice(0, 2).map(({ textContent }) => textContent)).toEqual([title, title]);
 });
 
 test.each([
@@ -124,7 +129,7 @@ test("certificates are on the page while the browser prints them", async () => {
   const sheets = () => [...root.querySelectorAll('[data-part="certificate"]')].map(({ textContent }) => textContent);
   const printed: (string | null)[][] = [];
   vi.stubGlobal("print", () => printed.push(sheets()));
-  await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
+  await mount(<Results live={{ tournament: tournament(), standings, games: [] }} />);
   const press = (label: string) =>
     act(async () => {
       const buttons = [...root.querySelectorAll("button")].filter(({ textContent }) => textContent === label);

@@ -1,7 +1,7 @@
 // Rooms like another, for playing again.
 
 import { create } from "@bufbuild/protobuf";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
 import {
@@ -29,11 +29,6 @@ const room = create(RoomSchema, {
     { seat: 2, builtInAgent: "replay", name: "P01", replay: { gameId: "g", seat: 3 } },
     { seat: 3, reservedFor: ParticipantKind.AGENT },
   ],
-});
-
-afterEach(() => {
-  vi.restoreAllMocks();
-  forgetAll();
 });
 
 test("a repeated room has the same rules, times and agents, and free seats otherwise", () => {

@@ -1,7 +1,7 @@
 // Stored seats and rooms survive a reload and invalid data; join codes are accepted as people type
 // them.
 
-import { beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { addressIn, codeIn } from "../src/lobby/JoinForm";
 import {
   decideSeat,
@@ -14,8 +14,6 @@ import {
   seatFromLink,
 } from "../src/lobby/seat";
 import { forgetAll, remember, remembered } from "../src/store";
-
-beforeEach(forgetAll);
 
 const ROOM = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const HELD = { ticket: `${ROOM}${"cd".repeat(32)}`, seat: 2, name: "Rosa" };

@@ -2,13 +2,11 @@
 // others.
 
 import type { StreamRequest, UnaryRequest } from "@connectrpc/connect";
-import { beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { keepSecret, secretsFor, showSecrets } from "../src/api/secrets";
 import { keepTableTicket } from "../src/attend/ticket";
 import { Visibility } from "../src/gen/chefshat/v1/room_pb";
-import { forgetAll, remember, remembered } from "../src/store";
-
-beforeEach(forgetAll);
+import { remember, remembered } from "../src/store";
 
 const ROOM = "0".repeat(32);
 const OTHER = "1".repeat(32);

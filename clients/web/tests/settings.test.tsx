@@ -2,13 +2,12 @@
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { serverApi } from "../src/api/client";
 import { GetServerInfoResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import { Settings } from "../src/parts/Settings";
-import { root } from "./mounted";
+import { button, later, mount, root } from "./mounted";
 
 const request = vi.fn(async () => {});
 const exit = vi.fn(async () => {});
@@ -22,22 +21,15 @@ afterEach(() => {
     Reflect.deleteProperty(document, name);
   Reflect.deleteProperty(document.documentElement, "requestFullscreen");
   vi.clearAllMocks();
-  vi.restoreAllMocks();
-  vi.useRealTimers();
 });
 
 async function show(fullscreenEnabled: boolean, fullscreenElement: Element | null) {
   Object.defineProperty(document, "fullscreenEnabled", { configurable: true, value: fullscreenEnabled });
   Object.defineProperty(document, "fullscreenElement", { configurable: true, value: fullscreenElement });
   const onClose = vi.fn();
-  await act(() => render(<Settings onClose={onClose} />, root));
+  await mount(<Settings onClose={onClose} />);
   return onClose;
 }
-const later = (ms: number) =>
-  act(async () => {
-    await vi.advanceTimersByTimeAsync(ms);
-  });
-const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);
 
 test("full screen is switched on, after the dialog has closed", async () => {
   const onClose = await show(true, null);
@@ -77,7 +69,7 @@ test("the time until the server answers is measured while the settings are open"
   ask.mockRejectedValue(new ConnectError("", Code.Unavailable));
   await later(3_000);
   expect(lag()).toMatch(/server/i);
-  act(() => render(null, root));
+  mount(null);
   await vi.advanceTimersByTimeAsync(60_000);
   expect(ask).toHaveBeenCalledTimes(2);
 });
@@ -92,7 +84,7 @@ test("a language that cannot be loaded is reported", async () => {
     const { startLanguage, t } = await import("../src/i18n");
     const { Settings } = await import("../src/parts/Settings");
     await startLanguage();
-    await act(() => render(<Settings onClose={() => {}} />, root));
+    await mount(<Settings onClose={() => {}} />);
     const select = root.querySelector("select");
     if (!select) throw new Error("there is no choice of a language");
     select.value = "it";
@@ -102,7 +94,5 @@ test("a language that cannot be loaded is reported", async () => {
     );
   } finally {
     vi.doUnmock("../src/i18n/it");
-    vi.unstubAllGlobals();
-    localStorage.clear();
   }
 });

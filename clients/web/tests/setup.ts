@@ -1,14 +1,21 @@
-// What the tests of one file leave in modules, the document and the stores is not there for the next.
+// What a test leaves in the browser is not there for the next one, nor what the tests of one file leave
+// in modules and the document.
 
-import { vi } from "vitest";
+import { afterEach, vi } from "vitest";
 
+const clear = () => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+  localStorage.clear();
+  sessionStorage.clear();
+  history.replaceState(null, "", "/");
+};
+
+afterEach(clear);
+
+clear();
 vi.resetModules();
-vi.useRealTimers();
-vi.unstubAllGlobals();
-vi.restoreAllMocks();
 document.body.replaceChildren();
 document.head.replaceChildren();
 for (const name of document.documentElement.getAttributeNames()) document.documentElement.removeAttribute(name);
-localStorage.clear();
-sessionStorage.clear();
-history.replaceState(null, "", "/");

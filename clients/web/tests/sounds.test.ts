@@ -41,7 +41,6 @@ beforeEach(() => {
 afterEach(() => {
   for (const tone of tones.splice(0)) tone.onended();
   vi.clearAllMocks();
-  vi.unstubAllGlobals();
   Reflect.deleteProperty(navigator, "userActivation");
 });
 

@@ -1,10 +1,9 @@
 // What this device stores: also where the browser stores nothing more, and with other tabs.
 
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { forgetAll, recall, remember, remembered } from "../src/store";
 
 beforeEach(forgetAll);
-afterEach(() => vi.restoreAllMocks());
 
 /** Lets the browser refuse to store anything. */
 const refuse = () =>

@@ -3,7 +3,7 @@
 import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
 import { signal } from "@preact/signals";
-import { type JSX, render } from "preact";
+import type { JSX } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
@@ -27,7 +27,7 @@ import { startTracing, targetOf } from "../src/studies/tracing";
 import { startLive } from "../src/table/model/live";
 import { emptyTable, seatFromParticipant } from "../src/table/model/state";
 import { SeatPanel } from "../src/table/view/SeatPanel";
-import { button, eventually, root, type } from "./mounted";
+import { button, eventually, later, mount, root, type } from "./mounted";
 import { refused } from "./refusals";
 import { fakeStudy, viewOf } from "./study-fake";
 
@@ -60,29 +60,15 @@ const items: StudyShownItem[] = ITEMS.map((item) => create(StudyShownItemSchema,
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout", "setInterval", "clearInterval"] });
 });
-afterEach(async () => {
-  // Leaving the page stops its stream.
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-  await setLanguage("en");
-  localStorage.clear();
-});
+afterEach(() => setLanguage("en"));
 
 const show = (beside?: JSX.Element) =>
-  act(async () => {
-    render(
-      <>
-        {beside}
-        <StudyPage route={{ page: "study", link: LINK }} />
-      </>,
-      root,
-    );
-  }).then(settled);
-const later = (ms: number) =>
-  act(async () => {
-    await vi.advanceTimersByTimeAsync(ms);
-  });
+  mount(
+    <>
+      {beside}
+      <StudyPage route={{ page: "study", link: LINK }} />
+    </>,
+  ).then(settled);
 const settled = () =>
   act(async () => {
     for (let turn = 0; turn < 5; turn += 1) await vi.advanceTimersByTimeAsync(0);
@@ -206,7 +192,7 @@ test("who is screened out reads why, and can have the data deleted", async () =>
   expect(root.querySelector("strong")?.textContent).toBe("adults");
   expect(root.querySelector<HTMLAnchorElement>('[data-part="go-on"]')?.href).toBe("https://panel.example/out");
   expect(button("Delete my data…")).toBeDefined();
-  await act(() => render(null, root));
+  await mount(null);
   fakeStudy([{ case: "end", value: { ...end, text: "" } }]);
   await show();
   expect(root.textContent).toContain("This study is meant for other people");
@@ -459,7 +445,7 @@ test("what is entered is kept by the server, shown on another device, and its ti
   ]);
 
   // The page is loaded again 20 s later.
-  await act(() => render(null, root));
+  await mount(null);
   state.stepAgeMs = 20_000n;
   clock.mockReturnValue(100);
   await show();
@@ -530,7 +516,7 @@ test("traces name what was touched and how long, and wait for the server", async
 
 test("a seat whose kind a study hides has its name, and is not free", async () => {
   const seat = seatFromParticipant(create(ParticipantSchema, { seat: 0, name: "Player 1", connected: true }));
-  await act(() => render(<SeatPanel table={emptyTable([seat])} seat={seat} deciding={false} />, root));
+  await mount(<SeatPanel table={emptyTable([seat])} seat={seat} deciding={false} />);
   expect(root.querySelector("h2")?.textContent).toBe("Player 1");
   expect(root.querySelector('[data-part~="kind-badge"]')).toBeNull();
 });

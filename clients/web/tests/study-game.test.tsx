@@ -2,9 +2,8 @@
 // decision time measured on the participant's device, which is sent with every answer.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { afterEach, beforeEach, expect, type MockInstance, test, vi } from "vitest";
+import { beforeEach, expect, type MockInstance, test, vi } from "vitest";
 import { playApi, roomApi } from "../src/api/client";
 import { AnswerStatus, DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import {
@@ -16,7 +15,7 @@ import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
 import { StudyPage } from "../src/studies/StudyPage";
 import { actionOf, maskOf } from "../src/table/model/actions";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { fakeStudy } from "./study-fake";
 import { DEALT, SEATS } from "./table-state";
 
@@ -78,17 +77,12 @@ beforeEach(() => {
     .spyOn(playApi, "act")
     .mockResolvedValue(create(ActResponseSchema, { result: { decisionId: 7n, status: AnswerStatus.ACCEPTED } }));
 });
-afterEach(async () => {
-  await act(() => render(null, root));
-  vi.useRealTimers();
-  vi.restoreAllMocks();
-});
 
 /** A participant's game, with its decision open. Returns what the page sends to the study. */
 async function play(traces: boolean) {
   const game = { game: 1, games: 1, roomId: "r1", gameId: GAME, ticket: "ef".repeat(48) };
   const { sent } = fakeStudy([{ case: "game", value: game }], { traces });
-  await act(() => render(<StudyPage route={{ page: "study", link: "Xk3_abcdefghijklmnopqrstuvwxy1" }} />, root));
+  await mount(<StudyPage route={{ page: "study", link: "Xk3_abcdefghijklmnopqrstuvwxy1" }} />);
   await pass(0);
   expect(root.querySelector("[data-decision]")).not.toBeNull();
   return sent;

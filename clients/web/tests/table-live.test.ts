@@ -13,7 +13,7 @@ import { DecisionSource } from "../src/gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { Role, SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
-import { en } from "../src/i18n/en";
+import * as en from "../src/i18n/en";
 import { maskOf } from "../src/table/model/actions";
 import { awaitedSeconds } from "../src/table/model/awaited";
 import { applyUpdate, type LiveState, startLive } from "../src/table/model/live";

@@ -1,20 +1,18 @@
 // The table of a physical room as its remote players and spectators see it.
 
-import { render } from "preact";
-import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
 import { Role } from "../src/gen/chefshat/v1/rules_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import type { TableState } from "../src/table/model/state";
 import { TableView } from "../src/table/view/TableView";
-import { root } from "./mounted";
+import { mount, root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
 const REMOTE = 2;
 
 const show = (table: TableState, own: number | undefined, replayed = false) =>
-  act(() => render(<TableView table={table} own={own} replayed={replayed} />, root));
+  mount(<TableView table={table} own={own} replayed={replayed} />);
 const dealt = (): TableState => ({ ...tableOf(stateOf({ observation: DEALT })), phase: "dealt", next: undefined });
 const heading = () => root.querySelector('[data-part~="now-heading"]')?.textContent;
 const banner = () => root.querySelector('[data-part~="table-banner"]')?.textContent;

@@ -1,8 +1,12 @@
-// States of a physical table as its server sends them, for the tests of the attendant's view.
+// States of a physical table as its server sends them, for the tests of the attendant's view, and a decision at a table.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { GameOrigin, ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
+import { SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
 import { TableStage, type TableState, TableStateSchema } from "../src/gen/chefshat/v1/table_service_pb";
+import type { Card } from "../src/table/model/cards";
+import type { OpenDecision } from "../src/table/model/live";
 
 const bytes = (...counts: number[]) => Uint8Array.from(counts);
 
@@ -61,4 +65,26 @@ export function stateOf(changed: MessageInitShape<typeof TableStateSchema> = {})
     seats: SEATS.map(({ seat, atTable = false }) => ({ atTable, handKnown: seat === 2 })),
   };
   return create(TableStateSchema, { ...usual, ...changed } as typeof usual);
+}
+
+/** An open turn of a seat with these cards, unless it is changed. */
+export function decisionOf(
+  hand: readonly Card[],
+  legal: readonly number[],
+  changed: Partial<OpenDecision> = {},
+): OpenDecision {
+  return {
+    id: 7n,
+    kind: DecisionKind.TURN,
+    legal,
+    hand,
+    requirement: undefined,
+    gift: undefined,
+    special: SpecialAction.UNSPECIFIED,
+    timeLeftMs: 0,
+    bankLeftMs: 0,
+    receivedAtMs: 0,
+    attemptsLeft: undefined,
+    ...changed,
+  };
 }

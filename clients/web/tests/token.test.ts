@@ -1,15 +1,11 @@
 // The token of a link: taken from the address, sent with each call, and in no link of this page.
 
 import type { UnaryRequest, UnaryResponse } from "@connectrpc/connect";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 
 const TOKEN = "chefshat_0badcafe_c2VjcmV0";
 
-beforeEach(() => {
-  vi.resetModules();
-  sessionStorage.clear();
-});
-afterEach(() => history.replaceState(null, "", "/"));
+beforeEach(() => void vi.resetModules());
 
 /** The page after it has been loaded at an address. */
 async function opened(address: string) {

@@ -3,16 +3,11 @@
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { signal } from "@preact/signals";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, expect, test, vi } from "vitest";
 import { startTracing } from "../src/studies/tracing";
 import type { LiveState } from "../src/table/model/live";
 
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-});
+beforeEach(() => void vi.useFakeTimers());
 
 /** Collects traces, whose calls last a second; what `fails` returns true for fails. */
 function collecting(fails: (call: number) => boolean) {

@@ -1,13 +1,12 @@
 // A server that has been updated: the page says so with a button, and only then.
 
 import { Code, ConnectError } from "@connectrpc/connect";
-import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { follow } from "../src/api/follow";
 import { lookForUpdate, outdated, startUpdates } from "../src/api/update";
 import { UpdateNotice, UpdateSetting } from "../src/parts/Update";
-import { root, settle } from "./mounted";
+import { mount, root, settle } from "./mounted";
 
 const documentOf = (script: string) =>
   new Response(`<html><head><script type="module" crossorigin src="${script}"></script></head></html>`);
@@ -23,8 +22,6 @@ beforeEach(() => {
 });
 afterEach(() => {
   document.head.replaceChildren();
-  vi.unstubAllGlobals();
-  vi.restoreAllMocks();
 });
 
 test.each([
@@ -95,14 +92,11 @@ test("a stream that is lost and back, a page that is seen again, and time look f
 
 test("the offer reloads, is closed once, and stays in the settings", async () => {
   const reload = vi.spyOn(location, "reload").mockImplementation(() => {});
-  await act(() =>
-    render(
-      <>
-        <UpdateNotice unattended={false} />
-        <UpdateSetting />
-      </>,
-      root,
-    ),
+  await mount(
+    <>
+      <UpdateNotice unattended={false} />
+      <UpdateSetting />
+    </>,
   );
   expect(root.textContent).toBe("");
   await act(() => {
@@ -119,7 +113,7 @@ test("the offer reloads, is closed once, and stays in the settings", async () =>
 
 test("a wall loads itself, and says nothing", async () => {
   const reload = vi.spyOn(location, "reload").mockImplementation(() => {});
-  await act(() => render(<UpdateNotice unattended />, root));
+  await mount(<UpdateNotice unattended />);
   expect(reload).not.toHaveBeenCalled();
   await act(() => {
     outdated.value = true;

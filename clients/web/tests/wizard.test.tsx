@@ -2,15 +2,13 @@
 // nothing about a person, the pace, and moves with the agent's suggestion.
 
 import { create } from "@bufbuild/protobuf";
-import { render } from "preact";
 import { act } from "preact/test-utils";
-import { beforeEach, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
-import { DecisionKind, ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
+import { ExpressionSource } from "../src/gen/chefshat/v1/decision_pb";
 import { HintSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { newForm, requestOf } from "../src/lobby/room-form";
-import { forgetAll } from "../src/store";
 import type { GivenHint } from "../src/table/acting";
 import { type Gesture, lineGesture, MAX_LINE, phraseOf, shownLabel } from "../src/table/expressions";
 import { actionOf } from "../src/table/model/actions";
@@ -20,26 +18,15 @@ import type { SeatState } from "../src/table/model/state";
 import { Console, isWizard } from "../src/wizard/Console";
 import { MAX_LINES, storedLines, storeLines } from "../src/wizard/lines";
 import { drawn, FIRST_PACE, paceOf, storedPace, storePace } from "../src/wizard/pace";
-import { root, type } from "./mounted";
-import { DEALT, stateOf } from "./table-state";
+import { mount, root, type } from "./mounted";
+import { DEALT, decisionOf, stateOf } from "./table-state";
 
 const FACES = 11;
 const PASS = actionOf({ kind: "pass" }, FACES);
 const NINES = actionOf({ kind: "play", face: 9, quantity: 2, jokers: 0 }, FACES);
 
-beforeEach(() => forgetAll());
-
-function decisionAt(receivedAtMs: number): OpenDecision {
-  return {
-    id: 7n,
-    kind: DecisionKind.TURN,
-    hand: cardsFromNumbers([3, 9, 9], false, FACES),
-    legal: [NINES, PASS],
-    timeLeftMs: 0,
-    bankLeftMs: 0,
-    receivedAtMs,
-  } as unknown as OpenDecision;
-}
+const decisionAt = (receivedAtMs: number) =>
+  decisionOf(cardsFromNumbers([3, 9, 9], false, FACES), [NINES, PASS], { receivedAtMs });
 
 interface Shown {
   said: Gesture[];
@@ -53,19 +40,16 @@ async function show(
 ): Promise<Shown> {
   const shown: Shown = { said: [], answered: [] };
   const table = { ...tableOf(stateOf({ observation: DEALT })), faces: FACES };
-  await act(() =>
-    render(
-      <Console
-        table={table}
-        decision={decision}
-        hint={hint}
-        sending={false}
-        onHint={onHint}
-        onAnswer={(action) => shown.answered.push(action)}
-        onExpress={(gesture) => shown.said.push(gesture)}
-      />,
-      root,
-    ),
+  await mount(
+    <Console
+      table={table}
+      decision={decision}
+      hint={hint}
+      sending={false}
+      onHint={onHint}
+      onAnswer={(action) => shown.answered.push(action)}
+      onExpress={(gesture) => shown.said.push(gesture)}
+    />,
   );
   return shown;
 }
@@ -179,7 +163,7 @@ test("a room without hints says so", async () => {
   const table = { ...tableOf(stateOf({ observation: DEALT })), faces: FACES };
   const nothing = () => {};
   const props = { table, decision: undefined, hint: undefined, sending: false, onHint: undefined };
-  await act(() => render(<Console {...props} onAnswer={nothing} onExpress={nothing} />, root));
+  await mount(<Console {...props} onAnswer={nothing} onExpress={nothing} />);
   expect(root.textContent).toContain("This room gives no suggestions.");
 });
 

@@ -6,19 +6,16 @@ import argparse
 import asyncio
 import json
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from pathlib import Path
 
 from chefshat import aio, pb
 from chefshat.errors import first_error
 from chefshat.join_options import add_server_options, server_of
 
 from chefshat_robot.bridge import Bridge
-from chefshat_robot.cli import CommandError
 from chefshat_robot.running import SERVER, run_command
-from chefshat_robot.vision import Camera, Perception, Recorder, SourceError, open_source
-from chefshat_robot.vision.frames import SOURCE_HELP, add_source_options, wish_of
+from chefshat_robot.vision.frames import SOURCE_HELP, open_source, wish_of
 from chefshat_robot.vision.hand import HandReader
+from chefshat_robot.vision.watching import add_options, watched
 
 DESCRIPTION = """\
 Watches a table with real cards through a camera and reports what happens to its physical room. What the camera cannot decide is
@@ -37,11 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", help=SOURCE_HELP)
     parser.add_argument("--ticket", required=True, help="the ticket of the table, from creating the room")
     add_server_options(parser, default=SERVER)
-    parser.add_argument("--camera", type=Path, metavar="FILE", help="the camera's calibration, from `chefshat-robot calibrate`")
-    parser.add_argument("--deck", type=int, choices=range(7), metavar="0..6", help="ignore the cards of other decks")
-    add_source_options(parser)
-    parser.add_argument("--record", type=Path, metavar="DIR", help="write what is seen to this folder, for `perceive --replay`")
-    parser.add_argument("--record-frames", action="store_true", help="with --record: write the frames too")
+    add_options(parser)
     parser.add_argument(
         "--hand",
         type=_seat_and_source,
@@ -62,35 +55,23 @@ def _seat_and_source(text: str) -> tuple[int, str]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs the subcommand. Returns 0 when the game or the frames have ended."""
-    if arguments.record_frames and arguments.record is None:
-        raise CommandError("--record-frames needs --record with a folder")
-    try:
-        with ExitStack() as stack:
-            camera = Camera.load(arguments.camera) if arguments.camera is not None else None
-            recorder = None
-            if arguments.record is not None:
-                recorder = stack.enter_context(Recorder(arguments.record, arguments.deck, arguments.record_frames))
-            frames = open_source(arguments.source, wish_of(arguments))
-            hands = [(seat, open_source(source, wish_of(arguments))) for seat, source in arguments.hand]
+    with watched(arguments) as (perception, frames):
+        hands = [
+            (seat, HandReader(deck=arguments.deck), open_source(source, wish_of(arguments))) for seat, source in arguments.hand
+        ]
 
-            async def watch() -> int:
-                async with aio.Client(server_of(arguments)) as client:
-                    perception = Perception(camera, arguments.deck, recorder)
-                    bridge = Bridge(client.tables, arguments.ticket, perception, on_report=report_printer(arguments.json))
-                    readers = [(seat, HandReader(deck=arguments.deck), source) for seat, source in hands]
-                    with first_error():
-                        async with asyncio.TaskGroup() as group:
-                            watched = [group.create_task(bridge.watch_hand(*reader)) for reader in readers]
-                            await bridge.run(frames)
-                            for task in watched:
-                                task.cancel()
-                    return 0
+        async def watch() -> int:
+            async with aio.Client(server_of(arguments)) as client:
+                bridge = Bridge(client.tables, arguments.ticket, perception, on_report=report_printer(arguments.json))
+                with first_error():
+                    async with asyncio.TaskGroup() as group:
+                        watching = [group.create_task(bridge.watch_hand(*hand)) for hand in hands]
+                        await bridge.run(frames)
+                        for task in watching:
+                            task.cancel()
+                return 0
 
-            return run_command(watch)
-    except FileExistsError as error:
-        raise CommandError(f"{error.filename} exists; give a folder without a recording") from error
-    except (SourceError, ValueError) as error:
-        raise CommandError(str(error)) from error
+        return run_command(watch)
 
 
 def report_printer(as_json: bool) -> Callable[[pb.TableReport, pb.ReportResponse], None]:

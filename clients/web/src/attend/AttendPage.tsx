@@ -10,6 +10,7 @@ import { CopyLine, QrCode, ThisMachine } from "../lobby/Invite";
 import { RoomInvite } from "../lobby/RoomInvite";
 import { isForAgents, isOpen } from "../lobby/rooms";
 import { ErrorPage } from "../parts/ErrorPage";
+import { useStarted } from "../parts/started";
 import type { PageProps } from "../router";
 import css from "./Attend.module.css";
 import { AttendView } from "./AttendView";
@@ -21,17 +22,11 @@ import { attendantLink, keepTableTicket, takeTicket } from "./ticket";
 export function AttendPage({ route }: PageProps<"attend">) {
   const { roomId } = route;
   const [ticket] = useState(() => takeTicket(roomId));
-  const [attending, setAttending] = useState<Attending | undefined>(undefined);
+  const attending = useStarted(() => (ticket === null ? undefined : startAttending(ticket)), ticket);
   useEffect(() => {
-    if (ticket === null) return;
-    const started = startAttending(ticket);
-    setAttending(started);
-    return () => {
-      started.stop();
-      // A reload shows the end again; a reader who leaves it is done.
-      if (started.state.peek()?.stage === TableStage.OVER) keepTableTicket(roomId, null);
-    };
-  }, [ticket]);
+    // A reload shows the end again; a reader who leaves it is done.
+    return () => attending?.state.peek()?.stage === TableStage.OVER && keepTableTicket(roomId, null);
+  }, [attending]);
   if (ticket === null) return <ErrorPage title={t().attend.title} words={t().attend.noTicket} />;
   return attending ? <Attended roomId={roomId} ticket={ticket} attending={attending} /> : null;
 }
@@ -87,7 +82,7 @@ function AttendantLink({ address }: { address: string }) {
     <div class={css.linkBody}>
       <div class="stack">
         <p>{words.text}</p>
-        <CopyLine label={words.address} text={address} />
+        <CopyLine label={t().lobby.invite.link} text={address} />
       </div>
       <QrCode text={address} label={words.qr} />
       <ThisMachine />

@@ -216,7 +216,7 @@ function Awaited({ state, table, heading, onPause, onConfirm }: AwaitedProps) {
         {stage === TableStage.OVER && (
           <p>
             <ButtonLink look="main" href={pathOf({ page: "replay", gameId: table.gameId })}>
-              {t().attend.room.replay}
+              {t().lobby.rooms.replay}
             </ButtonLink>
           </p>
         )}

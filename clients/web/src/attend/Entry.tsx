@@ -104,7 +104,7 @@ export function Entry({ state, table, draft, outcome, onDraft, onSend }: EntryPr
           <p class="soft">{words.clearedText}</p>
           <Actions>
             <Button look="main" onClick={() => onSend({ case: "cleared", value: {} })}>
-              {words.cleared}
+              {t().attend.reports.cleared}
             </Button>
           </Actions>
         </>

@@ -119,7 +119,7 @@ export function PlayPick({ deck, draft, requirement, golden, onChange }: PlayPic
               data-part="face-option"
               data-face={face > faces ? "J" : face}
               aria-pressed={draft.face === face}
-              aria-label={`${face > faces ? words.jokerAlone : cardWord(card)}${allowed(face) ? "" : `, ${words.notAllowed}`}`}
+              aria-label={`${face > faces ? t().table.lookup.loneJoker : cardWord(card)}${allowed(face) ? "" : `, ${words.notAllowed}`}`}
               onClick={() => pick(face)}
             >
               <Card card={card} />
@@ -242,7 +242,6 @@ export function HandPick({ deck, text, golden, asksGolden, expected, fault, onCh
         value={text}
         fault={problem ? problemWords(problem) : fault}
         onText={(typed) => onChange({ text: typed })}
-        autoComplete="off"
         autoCapitalize="characters"
       />
       <Choice label={words.tap} cards={all.length}>

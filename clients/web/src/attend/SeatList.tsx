@@ -13,7 +13,7 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
   const begun = state.observation !== undefined;
   return (
     <section class={`${css.part} sheet`} aria-labelledby="seats-title">
-      <h2 id="seats-title">{words.title}</h2>
+      <h2 id="seats-title">{t().table.room.seats}</h2>
       <ul class={css.seats}>
         {table.seats.map((seat) => {
           const known = state.seats[seat.seat]?.handKnown ?? false;
@@ -30,7 +30,7 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
                 </div>
                 <p class={css.badges}>
                   {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} name={seat.name} />}
-                  <span class="soft">{seat.atTable ? words.atTable : words.remote}</span>
+                  <span class="soft">{seat.atTable ? t().table.physical.atTable : words.remote}</span>
                   {isTaken(seat) && !seat.connected && !seat.builtIn && <strong>{t().table.presence.away}</strong>}
                 </p>
               </div>

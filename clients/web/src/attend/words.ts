@@ -121,5 +121,5 @@ export function lastViolationWords(state: TableState, table: Table, { seat, rule
       next: state.seat,
     },
   );
-  return t().attend.violation.of(seat === undefined ? "" : distinctName(table, seat), sentence);
+  return t().table.physical.violation(seat === undefined ? "" : distinctName(table, seat), sentence);
 }

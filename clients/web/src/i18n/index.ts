@@ -1,12 +1,12 @@
 // The language of the page: ?lang= in the address, else the stored choice, else the browser's, else
 // English. The texts are in a folder per language, one file per part of the page, and are loaded
-// when the language is shown. English defines their shape: a language that lacks a text does not
-// compile. A new language needs its folder and a line in TABLE.
+// when the language is shown. English defines their shape (texts.ts): a language that lacks a text
+// does not compile. A new language needs its folder and a line in TABLE.
 
 import { signal } from "@preact/signals";
 import { reloadsForNewVersion } from "../api/update";
 import { recall, remember } from "../store";
-import type { Texts } from "./en";
+import type { Texts } from "./texts";
 
 /** A language: its own name for itself, and how to load its texts. */
 interface Entry {
@@ -15,10 +15,10 @@ interface Entry {
 }
 
 const TABLE = {
-  en: { label: "English", load: async () => (await import("./en")).en },
-  de: { label: "Deutsch", load: async () => (await import("./de")).de },
-  es: { label: "Español", load: async () => (await import("./es")).es },
-  it: { label: "Italiano", load: async () => (await import("./it")).it },
+  en: { label: "English", load: () => import("./en") },
+  de: { label: "Deutsch", load: () => import("./de") },
+  es: { label: "Español", load: () => import("./es") },
+  it: { label: "Italiano", load: () => import("./it") },
 } satisfies Record<string, Entry>;
 
 /** Languages with texts, by their ISO 639-1 codes. */

@@ -35,7 +35,7 @@ export function Doorway({ roomId }: { roomId: string }) {
         <section class="sheet">
           <Notice kind="fault">{wordsOf(fault)}</Notice>
           <p>
-            <ButtonLink href="/">{words.toLobby}</ButtonLink>
+            <ButtonLink href="/">{t().common.toLobby}</ButtonLink>
           </p>
         </section>
       </div>
@@ -66,14 +66,13 @@ export function Doorway({ roomId }: { roomId: string }) {
 
 /** How to join while the room waits. */
 function WayIn({ room }: { room: Room }) {
-  const words = t().lobby.door;
   const hosted = hostedRoom(room.roomId);
   const seatForPeople = freeForPeople(room.seats).length > 0;
   return (
     <>
       {seatForPeople && (
         <section class="sheet stack">
-          <h2>{words.sitDown}</h2>
+          <h2>{t().lobby.join.sitDown}</h2>
           {hosted ? <NameForm code={hosted.joinCode} room={room} /> : <JoinForm />}
         </section>
       )}
@@ -90,7 +89,7 @@ function DoorwayLinks({ room }: { room: Room }) {
     <div class="row">
       {!over && tableTicket(room.roomId) !== null && (
         <ButtonLink look="main" href={pathOf({ page: "attend", roomId: room.roomId })}>
-          {t().attend.room.attend}
+          {t().attend.title}
         </ButtonLink>
       )}
       {over && <ButtonLink href={pathOf({ page: "replay", gameId: room.gameId })}>{words.replay}</ButtonLink>}

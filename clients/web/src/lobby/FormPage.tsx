@@ -3,7 +3,7 @@
 
 import type { ComponentChildren } from "preact";
 import { type Offered, useOffered } from "../api/server";
-import { Button } from "../parts/Button";
+import { Submit } from "../parts/ActionButton";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import css from "./FormPage.module.css";
@@ -44,7 +44,6 @@ export function FormFrame({ state, words, first, children, folded }: FormFramePr
           onText={(name) => state.change({ name })}
           fault={state.faults.name}
           maxLength={MAX_NAME}
-          autoComplete="off"
           placeholder={words.namePlaceholder}
         />
         {first}
@@ -60,12 +59,9 @@ export function FormFrame({ state, words, first, children, folded }: FormFramePr
         </summary>
         {folded}
       </details>
-      {state.refusal && <Notice kind="fault">{state.refusal}</Notice>}
-      <div>
-        <Button look="main" type="submit" busy={state.busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit busy={state.busy} fault={state.refusal}>
+        {words.submit}
+      </Submit>
     </form>
   );
 }

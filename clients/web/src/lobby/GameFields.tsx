@@ -220,7 +220,6 @@ export function Typed<Name extends string>(props: TypedProps<Name>) {
       value={form[name]}
       fault={faults[name]}
       onText={(text) => change({ [name]: text } as { [Key in Name]?: string })}
-      autoComplete="off"
     />
   );
 }

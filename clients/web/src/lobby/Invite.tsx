@@ -28,7 +28,7 @@ export function Invite({ title, code, address, agent }: InviteProps) {
       <div class="stack">
         <h2>{title}</h2>
         <p>{words.text}</p>
-        <CopyLine label={words.code} text={code} large />
+        <CopyLine label={t().lobby.join.code} text={code} large />
         <CopyLine label={words.link} text={address} />
         {agent && <CopyLine label={agent.label} text={agent.command} mono />}
       </div>

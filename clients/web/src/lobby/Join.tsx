@@ -7,8 +7,9 @@ import { usePolled } from "../api/poll";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { languageOf, t } from "../i18n";
 import { NO_KEY } from "../name-key";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
-import { Button, ButtonLink } from "../parts/Button";
+import { ButtonLink } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate, navigateFromHere, type PageProps, pathOf, type Route } from "../router";
@@ -51,7 +52,7 @@ function WayIn({ code }: { code: string }) {
     return (
       <>
         <p>
-          {words.codeIs} <span class={css.code}>{code}</span>
+          {words.code} <span class={css.code}>{code}</span>
         </p>
         <Notice kind="fault">{wordsOf(fault)}</Notice>
         <JoinForm />
@@ -147,7 +148,7 @@ export function NameForm({ code, room }: NameFormProps) {
   return (
     <form class={css.form} onSubmit={join}>
       <p>
-        {words.codeIs} <span class={css.code}>{code}</span>
+        {words.code} <span class={css.code}>{code}</span>
       </p>
       <TextField
         label={words.name}
@@ -167,10 +168,7 @@ export function NameForm({ code, room }: NameFormProps) {
           </span>
         </label>
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" type="submit" busy={busy}>
-        {words.sitDown}
-      </Button>
+      <Submit {...{ busy, fault }}>{words.sitDown}</Submit>
     </form>
   );
 }

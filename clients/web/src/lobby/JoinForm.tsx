@@ -30,7 +30,6 @@ export function JoinForm() {
         value={code}
         onText={setCode}
         fault={missing ? words.codeMissing : undefined}
-        autoComplete="off"
         autoCapitalize="characters"
         placeholder="BCDF2345"
       />

@@ -84,7 +84,7 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
           </Button>
           {hostedRoom(roomId) && (
             <Button busy={busy} onClick={() => run(close)}>
-              {playing ? words.end : words.close}
+              {playing ? words.end : t().lobby.door.close}
             </Button>
           )}
         </p>

@@ -37,7 +37,7 @@ export function Lobby() {
   const own = usePolled((signal) => openRooms(held, signal), EVERY_MS, held.join()).value ?? [];
   return (
     <div class={css.lobby}>
-      <h1 class="visually-hidden">{words.title}</h1>
+      <h1 class="visually-hidden">{t().common.nav.lobby}</h1>
       {own.length > 0 && (
         <section class={css.section} data-part="own-seats">
           <h2>{words.rooms.own}</h2>

@@ -36,7 +36,7 @@ export function QuickGame() {
       <p>{words.text}</p>
       <form class={css.form} onSubmit={start}>
         <TextField
-          label={words.name}
+          label={t().lobby.join.name}
           value={name}
           onText={setName}
           maxLength={MAX_NAME}

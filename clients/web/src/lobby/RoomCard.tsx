@@ -44,7 +44,7 @@ function RoomActions({ room }: { room: Room }) {
   );
   if (room.state === RoomState.FINISHED) return link(pathOf({ page: "replay", gameId }), words.replay);
   if (heldSeat(roomId)) return link(pathOf({ page: "room", roomId }), words.goBack, true);
-  const attend = tableTicket(roomId) !== null && link(pathOf({ page: "attend", roomId }), t().attend.room.attend, true);
+  const attend = tableTicket(roomId) !== null && link(pathOf({ page: "attend", roomId }), t().attend.title, true);
   const watch = room.policy?.spectators && link(pathOf({ page: "watch", roomId }), words.watch);
   if (room.state === RoomState.PLAYING) {
     if (!attend && !watch) return <span class="soft small">{words.closed}</span>;

@@ -85,7 +85,6 @@ export function SeatFields({ form, faults, change, agents }: SeatFieldsProps) {
                     change({ seatNames: form.seats.map((_, at) => (at === seat ? typed : (form.seatNames[at] ?? ""))) })
                   }
                   maxLength={MAX_NAME}
-                  autoComplete="off"
                 />
               )}
             </li>
@@ -103,18 +102,16 @@ function choiceWord(choice: SeatChoice, real: boolean): string {
       return words.atTableHuman;
     case "at-table robot":
       return words.atTableRobot;
-    case "human":
-      return real ? words.remoteHuman : words.human;
-    case "anybody":
-      return real ? words.remoteAnybody : words.anybody;
-    case "agent":
-      return real ? words.remoteAgent : words.agent;
-    case "robot":
-      return real ? words.remoteRobot : words.robot;
-    case "model":
-      return real ? words.remoteModel : words.model;
     case "wizard":
       return words.wizard;
+    case "human":
+    case "anybody":
+    case "agent":
+    case "robot":
+    case "model": {
+      const free = words[choice];
+      return real ? words.remote(free.charAt(0).toLowerCase() + free.slice(1)) : free;
+    }
     default:
       return words.builtIn(choice.slice("built-in ".length));
   }

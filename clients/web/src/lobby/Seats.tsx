@@ -18,7 +18,7 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
           <SeatNumber seat={participant.seat} />
           <span class="visually-hidden">{t().common.seat(participant.seat)}:</span>
           {isFree(participant) ? (
-            <span class={css.free}>
+            <span class="soft">
               {participant.reservedFor === ParticipantKind.UNSPECIFIED
                 ? words.free
                 : words.reservedFor(kindWord(participant.reservedFor))}
@@ -33,7 +33,7 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
               {participant.atTable ? (
                 <span class="soft small">{t().table.physical.atTable}</span>
               ) : (
-                !participant.connected && <span class={css.away}>{words.away}</span>
+                !participant.connected && <span class={css.away}>{t().table.presence.away}</span>
               )}
             </>
           )}

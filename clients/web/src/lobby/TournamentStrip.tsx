@@ -23,7 +23,7 @@ export function TournamentStrip() {
   if (!found) return null;
   return (
     <section class={`${lobbyCss.section} ${lobbyCss.beside}`} data-part="lobby-section">
-      <h2>{words.title}</h2>
+      <h2>{t().common.nav.tournaments}</h2>
       {found.length === 0 && <p class="soft">{words.none}</p>}
       <ul class={css.tournamentStrip}>
         {found.map((tournament) => (

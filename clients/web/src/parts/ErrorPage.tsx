@@ -24,7 +24,7 @@ export function ErrorPage({ title, words, children }: ErrorPageProps) {
       {children && <p>{children}</p>}
       {!hidden.value.includes("pages") && (
         <p>
-          <ButtonLink href="/">{t().common.notFound.link}</ButtonLink>
+          <ButtonLink href="/">{t().common.toLobby}</ButtonLink>
         </p>
       )}
     </section>

@@ -59,23 +59,29 @@ interface TextProps extends FieldFrame {
   value: string;
   onText: (text: string) => void;
   type?: "text" | "datetime-local";
+  /** How many lines are shown; one by default, and then there is only one. */
+  rows?: number;
   /** For numbers. A field of the type "number" would say that it is empty where it shows "12px". */
   inputMode?: "numeric";
   name?: string;
   maxLength?: number;
+  /** What the browser offers to fill in; nothing by default. */
   autoComplete?: string;
   autoCapitalize?: "characters" | "none" | "words";
   placeholder?: string;
   required?: boolean;
 }
 
-/** A line of text, or a local time as text. */
-export function TextField({ label, hint, fault, faultId, onText, type = "text", ...rest }: TextProps) {
+/** Text, or a local time as text. */
+export function TextField(props: TextProps) {
+  const { label, hint, fault, faultId, onText, rows, type = "text", autoComplete = "off", ...rest } = props;
+  const onInput = (event: { currentTarget: { value: string } }) => onText(event.currentTarget.value);
+  const typed = { ...rest, autoComplete, onInput };
   return (
     <Field label={label} hint={hint} fault={fault} faultId={faultId}>
-      {(joined) => (
-        <input {...rest} {...joined} type={type as "text"} onInput={(event) => onText(event.currentTarget.value)} />
-      )}
+      {(joined) =>
+        rows ? <textarea {...typed} {...joined} rows={rows} /> : <input {...typed} {...joined} type={type as "text"} />
+      }
     </Field>
   );
 }

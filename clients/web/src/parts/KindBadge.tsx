@@ -21,7 +21,7 @@ export function KindBadge({ kind, builtIn = "", name = builtIn }: KindBadgeProps
   const character = name === "" || name === builtIn || inStudy.value ? undefined : characterWords(builtIn);
   return (
     <span class={css.kindBadge} data-part="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
-      <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />
+      <Drawing name={builtIn === "" ? KINDS[kind][1] : "kind-built-in"} />
       <span>
         {builtIn === "" ? kindWord(kind) : t().common.kinds.agent}
         {character && <span data-part="character"> · {character}</span>}
@@ -37,27 +37,15 @@ function characterWords(builtIn: string): string | undefined {
   return t().common.characters[agent];
 }
 
-const symbols: Record<ParticipantKind, string> = {
-  [ParticipantKind.UNSPECIFIED]: "kind-open",
-  [ParticipantKind.AGENT]: "kind-agent",
-  [ParticipantKind.HUMAN]: "kind-person",
-  [ParticipantKind.ROBOT]: "kind-robot",
-  [ParticipantKind.MODEL]: "kind-model",
-};
+const KINDS = {
+  [ParticipantKind.UNSPECIFIED]: ["open", "kind-open"],
+  [ParticipantKind.AGENT]: ["agent", "kind-agent"],
+  [ParticipantKind.HUMAN]: ["human", "kind-person"],
+  [ParticipantKind.ROBOT]: ["robot", "kind-robot"],
+  [ParticipantKind.MODEL]: ["model", "kind-model"],
+} as const;
 
 /** A kind in a word. */
 export function kindWord(kind: ParticipantKind): string {
-  const words = t().common.kinds;
-  switch (kind) {
-    case ParticipantKind.AGENT:
-      return words.agent;
-    case ParticipantKind.HUMAN:
-      return words.human;
-    case ParticipantKind.ROBOT:
-      return words.robot;
-    case ParticipantKind.MODEL:
-      return words.model;
-    default:
-      return words.open;
-  }
+  return t().common.kinds[KINDS[kind][0]];
 }

@@ -98,47 +98,30 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
 
 /** The page's title in the browser's tab. */
 function pageName(here: Route): string {
-  const words = t();
-  switch (here.page) {
-    case "lobby":
-      return words.common.nav.lobby;
-    case "new":
-      return words.lobby.make.title;
-    case "join":
-      return words.lobby.join.title;
-    case "room":
-      return words.table.title;
-    case "attend":
-      return words.attend.title;
-    case "watch":
-      return words.lobby.rooms.watch;
-    case "replay":
-      return words.replay.title;
-    case "tournaments":
-    case "tournament":
-      return words.common.nav.tournaments;
-    case "results":
-      return words.tournaments.results.title;
-    case "newTournament":
-      return words.organise.title;
-    case "study":
-      return words.studies.title;
-    case "studies":
-    case "ownStudy":
-      return words.studies.own.title;
-    case "newStudy":
-      return words.studies.make.title;
-    case "leaderboard":
-      return words.common.nav.leaderboard;
-    case "person":
-      return here.name;
-    case "tutorial":
-      return words.common.nav.tutorial;
-    case "rules":
-      return words.rules.title;
-    case "unknown":
-      return words.common.notFound.title;
-  }
+  const { attend, common, lobby, organise, replay, rules, studies, table, tournaments } = t();
+  if (here.page === "person") return here.name;
+  const names: Record<Exclude<Route["page"], "person">, string> = {
+    lobby: common.nav.lobby,
+    new: lobby.make.title,
+    join: lobby.join.title,
+    room: table.title,
+    attend: attend.title,
+    watch: lobby.rooms.watch,
+    replay: replay.title,
+    tournaments: common.nav.tournaments,
+    tournament: common.nav.tournaments,
+    results: tournaments.results.title,
+    newTournament: organise.title,
+    study: studies.title,
+    studies: studies.own.title,
+    ownStudy: studies.own.title,
+    newStudy: studies.make.title,
+    leaderboard: common.nav.leaderboard,
+    tutorial: common.nav.tutorial,
+    rules: rules.title,
+    unknown: common.notFound.title,
+  };
+  return names[here.page];
 }
 
 /** Two sliders, as the icon of the settings. */

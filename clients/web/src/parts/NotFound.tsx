@@ -11,7 +11,7 @@ export function NotFound() {
       <h1>{words.title}</h1>
       <p>{words.text}</p>
       <p>
-        <ButtonLink href="/">{words.link}</ButtonLink>
+        <ButtonLink href="/">{t().common.toLobby}</ButtonLink>
       </p>
     </section>
   );

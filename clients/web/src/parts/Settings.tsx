@@ -126,7 +126,6 @@ function OwnNames() {
         value={text}
         onText={change}
         autoCapitalize="none"
-        autoComplete="off"
       />
       {isKey && stored !== null && text.toLowerCase() !== stored && (
         <ConfirmButton label={words.use} look="plain" act={async () => store(text)}>

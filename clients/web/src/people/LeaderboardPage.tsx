@@ -50,7 +50,7 @@ export function LeaderboardPage() {
   const kinds = Object.keys(KINDS) as (keyof typeof KINDS)[];
   return (
     <div class={css.people}>
-      <h1>{words.title}</h1>
+      <h1>{t().common.nav.leaderboard}</h1>
       <p class="soft">{words.text}</p>
       <div class={css.filter}>
         <SelectField
@@ -72,7 +72,10 @@ export function LeaderboardPage() {
       {value && value.rated.length > 0 && (
         <>
           <Lines rated={rated} />
-          <MoreButton shown={{ list, fault, showMore: () => setLines(lines + LINES) }} what={words.title} />
+          <MoreButton
+            shown={{ list, fault, showMore: () => setLines(lines + LINES) }}
+            what={t().common.nav.leaderboard}
+          />
           {rated.length === MAX_LINES && <p class="soft">{words.truncated(MAX_LINES)}</p>}
           <WhichAreRated />
         </>
@@ -95,7 +98,7 @@ function Nobody({ anybody }: { anybody: boolean }) {
 }
 
 function Lines({ rated }: { rated: readonly Rated[] }) {
-  const words = t().people.columns;
+  const words = t().common.columns;
   const ranges = rated.flatMap(({ rating }) => (rating ? [ratingRange(rating)] : []));
   const lowest = Math.min(...ranges.map(({ from }) => from));
   const highest = Math.max(...ranges.map(({ to }) => to));
@@ -103,7 +106,7 @@ function Lines({ rated }: { rated: readonly Rated[] }) {
   const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
-      <table class={css.leaderboard}>
+      <table class={`listing ${css.leaderboard}`}>
         <caption class="soft small">{t().people.order}</caption>
         <thead>
           <tr>
@@ -111,7 +114,7 @@ function Lines({ rated }: { rated: readonly Rated[] }) {
             <th scope="col" class={css.leaderboardName}>
               {words.name}
             </th>
-            <th scope="col" title={words.ratingHint}>
+            <th scope="col" title={t().people.ratingHint}>
               {words.rating}
             </th>
             <td class={css.leaderboardRange} />

@@ -76,7 +76,12 @@ function Facts({ rated, games }: { rated: Ratings | null; games: readonly OwnGam
         <Rating key={`${line.kind} ${line.builtIn} ${line.nameFingerprint}`} line={line} />
       ))}
       {rated && lines.length === 0 && (
-        <Fact label={words.rating} value="–" text={rated.complete ? words.unrated : words.notListed(MAX_LINES)} wide />
+        <Fact
+          label={t().common.columns.rating}
+          value="–"
+          text={rated.complete ? words.unrated : words.notListed(MAX_LINES)}
+          wide
+        />
       )}
       {games.length > 0 && <Fact label={words.games} value={String(finished)} text={words.ofShown(games.length)} />}
       {finished > 0 && (
@@ -97,7 +102,7 @@ function Rating({ line }: { line: Rated }) {
   const place = `${words.person.rated(line.place)}, ${words.ratedGames(line.rating.games)}.`;
   const label = (
     <>
-      {words.person.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />{" "}
+      {t().common.columns.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />{" "}
       {line.nameFingerprint && (
         <a href={pathOf({ page: "person", name: line.name, fingerprint: line.nameFingerprint })}>
           <Fingerprint of={line.nameFingerprint} />
@@ -132,7 +137,7 @@ function NotRated({ record, seat }: Pick<OwnGame, "record" | "seat">) {
 function Games({ games }: { games: readonly OwnGame[] }) {
   const words = t().people.person;
   return (
-    <table class={css.personGames}>
+    <table class={`listing ${css.personGames}`}>
       <thead>
         <tr>
           <th scope="col">{words.columns.date}</th>
@@ -153,7 +158,7 @@ function Games({ games }: { games: readonly OwnGame[] }) {
               <td class="number">{points ?? "–"}</td>
               <td class={css.personGame}>
                 <a href={pathOf({ page: "replay", gameId: record.gameId })}>
-                  {words.replay}
+                  {t().lobby.rooms.replay}
                   <span class="visually-hidden"> {words.of(record.roomName, date)}</span>
                 </a>{" "}
                 <span class="soft small">

@@ -71,7 +71,7 @@ function Estimates({ gameId, decisions, table, open }: EstimatesProps) {
           <thead class="visually-hidden">
             <tr>
               <th scope="col">{words.action}</th>
-              <th scope="col">{words.points}</th>
+              <th scope="col">{t().common.columns.points}</th>
             </tr>
           </thead>
           <tbody>

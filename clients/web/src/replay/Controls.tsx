@@ -42,7 +42,7 @@ export function Controls({
   const last = film.length - 1;
   const shift = film.shifts.findLast((start) => start.frame <= at);
   return (
-    <section class={replayCss.replay} data-part="replay" aria-label={words.controls}>
+    <section class={replayCss.replay} data-part="replay" aria-label={words.title}>
       <div class={`${replayCss.bar} sheet`} data-part="replay-bar">
         <div class={replayCss.buttons}>
           <Step label={words.first} path="M18 5v14l-9-7ZM6 5v14" disabled={at === 0} onClick={() => onGo(0)} />

@@ -5,9 +5,8 @@
 
 import type { GameEvent } from "../gen/chefshat/v1/event_pb";
 import type { DecisionRecord, RecordHeader, RecordLine } from "../gen/chefshat/v1/record_pb";
-import { GameOrigin } from "../gen/chefshat/v1/room_pb";
 import { applyEvent } from "../table/model/reduce";
-import { emptyTable, fromRules, seatFromParticipant, type TableState } from "../table/model/state";
+import { emptyTable, type TableState, tableFromRoom } from "../table/model/state";
 
 /** Moments between stored tables: this many events are applied faster than the table is drawn. */
 const STORED_EVERY = 200;
@@ -140,14 +139,7 @@ function folded(start: TableState, moments: readonly Moment[], storedEvery: numb
   };
 }
 
+/** The table before the first event. A record has the game as corrected, so it needs no history. */
 function tableFromHeader(header: RecordHeader): TableState {
-  return {
-    ...emptyTable(header.seats.map(seatFromParticipant)),
-    ...fromRules(header.rules),
-    roomId: header.roomId,
-    roomName: header.roomName,
-    gameId: header.gameId,
-    policy: header.policy,
-    physical: header.origin === GameOrigin.PHYSICAL,
-  };
+  return { ...tableFromRoom({ ...header, name: header.roomName }), history: undefined };
 }

@@ -2,7 +2,7 @@
 
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
-import { CheckField, Field, SelectField, TextField } from "../parts/Field";
+import { CheckField, SelectField, TextField } from "../parts/Field";
 import css from "./Own.module.css";
 import type { ConditionForm, QuestionForm, StudyFaults } from "./study-form";
 
@@ -43,7 +43,6 @@ export function ConditionFields(
           value={condition.id}
           onText={(id) => onChange({ id })}
           fault={faults[`condition.${index}`]}
-          autoComplete="off"
         />
         <SelectField
           label={words.opponents}
@@ -64,7 +63,6 @@ export function ConditionFields(
             value={condition.levels[factor] ?? ""}
             onText={(level) => onChange({ levels: { ...condition.levels, [factor]: level } })}
             fault={faults[`level.${index}.${factor}`]}
-            autoComplete="off"
           />
         ))}
       </div>
@@ -79,7 +77,6 @@ export function ConditionFields(
           value={condition.behaviour}
           onText={(behaviour) => onChange({ behaviour })}
           maxLength={MAX_BEHAVIOUR}
-          autoComplete="off"
         />
       )}
       {onRemove && (
@@ -106,7 +103,6 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
         onText={(text) => onChange({ text })}
         fault={faults[`question.${index}`]}
         maxLength={MAX_QUESTION}
-        autoComplete="off"
       />
       <div class={css.fields}>
         <SelectField
@@ -123,16 +119,13 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
         />
       </div>
       {question.kind === "choice" && (
-        <Field label={words.options} fault={faults[`options.${index}`]}>
-          {(joined) => (
-            <textarea
-              {...joined}
-              rows={4}
-              value={question.options}
-              onInput={(event) => onChange({ options: event.currentTarget.value })}
-            />
-          )}
-        </Field>
+        <TextField
+          label={words.options}
+          rows={4}
+          value={question.options}
+          onText={(options) => onChange({ options })}
+          fault={faults[`options.${index}`]}
+        />
       )}
       <CheckField label={words.optional} checked={question.optional} onCheck={(optional) => onChange({ optional })} />
       {onRemove && (

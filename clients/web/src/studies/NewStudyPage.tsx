@@ -4,6 +4,7 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { agentsFor, useOffered } from "../api/server";
 import type { StudySettings } from "../gen/chefshat/v1/study_pb";
 import { language, languages, t } from "../i18n";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
@@ -91,7 +92,8 @@ function FromFile() {
   );
 }
 
-type PanelUrl = (typeof PANEL_URLS)[number];
+/** The fields that are typed. */
+type TextName = { [Name in keyof StudyForm]: string extends StudyForm[Name] ? Name : never }[keyof StudyForm];
 const DEVICES: readonly StudyForm["device"][] = ["any", "fine", "coarse"];
 
 function FromForm() {
@@ -122,30 +124,18 @@ function FromForm() {
     const navigate = navigateFromHere();
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form)) }));
   };
-  const text = (
-    name: "name" | "title" | "factors" | "version" | "external" | "idParameter" | PanelUrl,
-    label: string,
-    hint?: string,
-  ) => (
+  const text = (name: TextName, label: string, hint?: string, shown: { rows?: number; inputMode?: "numeric" } = {}) => (
     <TextField
       label={label}
       hint={hint}
       value={form[name]}
       onText={(typed) => change({ [name]: typed })}
       fault={faults[name]}
-      autoComplete="off"
+      {...shown}
     />
   );
-  const number = (name: "participants" | "people" | "games" | "shifts" | "minWidth", label: string, hint?: string) => (
-    <TextField
-      label={label}
-      hint={hint}
-      inputMode="numeric"
-      value={form[name]}
-      onText={(typed) => change({ [name]: typed })}
-      fault={faults[name]}
-    />
-  );
+  const number = (name: TextName, label: string, hint?: string) => text(name, label, hint, { inputMode: "numeric" });
+  const long = (name: TextName, label: string, hint?: string) => text(name, label, hint, { rows: 6 });
   const check = (name: "within" | "practice" | "traces" | "openLink" | "fill", label: string) => (
     <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
   );
@@ -162,18 +152,6 @@ function FromForm() {
       />
     );
   };
-  const long = (name: "consent" | "debriefing" | "seeds", label: string, hint?: string) => (
-    <Field label={label} hint={hint} fault={faults[name]}>
-      {(joined) => (
-        <textarea
-          {...joined}
-          rows={6}
-          value={form[name]}
-          onInput={(event) => change({ [name]: event.currentTarget.value })}
-        />
-      )}
-    </Field>
-  );
   return (
     <form ref={sent} class={`sheet ${css.part}`} onSubmit={submit} noValidate data-part="study-form">
       <h2>{words.form}</h2>
@@ -282,12 +260,7 @@ function FromForm() {
       {(unfinished.length > 0 || Object.keys(faults).length > 0) && (
         <Notice kind="fault">{t().lobby.make.lookAgain}</Notice>
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button type="submit" look="main" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
     </form>
   );
 }

@@ -10,7 +10,6 @@ import {
   type Study,
   type StudyLink,
   type StudyParticipant,
-  StudyParticipantState,
   StudyPointer,
   type StudyRequiredDevice,
 } from "../gen/chefshat/v1/study_pb";
@@ -18,34 +17,21 @@ import { hex } from "../hex";
 import { momentOf, t } from "../i18n";
 import { CopyLine, QrCode } from "../lobby/Invite";
 import { MAX_NAME } from "../lobby/room-form";
+import { ActionButton, Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { download, fileName } from "../parts/download";
-import { CheckField, Field, TextField } from "../parts/Field";
+import { CheckField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import { zipped } from "../parts/zip";
 import { navigateFromHere, type PageProps } from "../router";
 import { byCondition, stateName, statesOf } from "./board";
 import { studyApi } from "./client";
 import { LinkList } from "./LinkList";
 import css from "./Own.module.css";
-import {
-  addParticipants,
-  addressOf,
-  addTestParticipants,
-  closeStudy,
-  deleteDataOf,
-  deleteStudy,
-  exportStudy,
-  keepOwnerToken,
-  linksOf,
-  mayOwn,
-  ownership,
-  ownerTokenOf,
-  removeFromStudy,
-  settingsOfStudy,
-} from "./owning";
+import { addressOf, deleteStudy, exportStudy, keepOwnerToken, mayOwn, ownership, ownerTokenOf } from "./owning";
 import { MAX_ADDED, participantsIn } from "./participants";
 import { fileOf } from "./settings-file";
 
@@ -78,7 +64,6 @@ function Unlock({ studyId, onKey }: { studyId: string; onKey: () => void }) {
         hint={words.keyHint}
         value={key}
         onText={setKey}
-        autoComplete="off"
         fault={tried ? words.keyHint : undefined}
       />
       <div>
@@ -99,11 +84,11 @@ interface StudyFollowing {
   readonly following: Following;
   /** Takes over what is known of participants. */
   merge(study: Study | undefined, participants: readonly StudyParticipant[]): void;
+  stop(): void;
 }
 
 function useStudy(studyId: string): StudyFollowing | undefined {
-  const [followed, setFollowed] = useState<StudyFollowing>();
-  useEffect(() => {
+  const start = () => {
     const live = signal<FollowedStudy | undefined>(undefined);
     const merge = (study: Study | undefined, participants: readonly StudyParticipant[]) => {
       const now = live.peek();
@@ -127,10 +112,9 @@ function useStudy(studyId: string): StudyFollowing | undefined {
       },
       { isComplete: isOver, restsWhileHidden: true },
     );
-    setFollowed({ live, following, merge });
-    return () => following.stop();
-  }, [studyId]);
-  return followed;
+    return { live, following, merge, stop: following.stop };
+  };
+  return useStarted(start, studyId);
 }
 
 /** The study, or `unlock` to enter another key if this device's is not that of a study of the server. */
@@ -149,7 +133,7 @@ function Owned({ studyId, unlock }: { studyId: string; unlock: ComponentChild })
   }
   return (
     <>
-      {link === "lost" && <Notice kind="fault">{t().studies.lost}</Notice>}
+      {link === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
       {live && followed ? (
         <OwnStudy {...live} onChanged={(participant) => followed.merge(undefined, [participant])} />
       ) : (
@@ -169,6 +153,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
   const words = t().studies.own;
   const { studyId, settings, closed } = study;
   const deletesAtMs = settings?.deletesAtMs ?? 0n;
+  const close = () => studyApi.closeStudy(ownership(studyId)).then(() => false);
   return (
     <div class={css.page} data-part="own-study">
       <header class={css.head}>
@@ -196,7 +181,7 @@ export function OwnStudy({ study, participants, onChanged }: OwnStudyProps) {
       </details>
       <SettingsFile studyId={studyId} />
       {!closed && (
-        <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeStudy(studyId).then(() => false)}>
+        <ConfirmButton label={words.close} confirm={words.closeDo} act={close}>
           {words.closeText}
         </ConfirmButton>
       )}
@@ -215,18 +200,15 @@ function deviceWords({ pointer, minWidth }: StudyRequiredDevice): string {
 
 /** The settings as a file; only a call for them has the pictures. */
 function SettingsFile({ studyId }: { studyId: string }) {
-  const { busy, fault, run } = useAttempt();
   const save = async () => {
-    const settings = await settingsOfStudy(studyId);
+    const settings = (await studyApi.getStudy(ownership(studyId))).study?.settings;
     if (settings) download(fileOf(settings), `${fileName(settings.name)}.json`, "application/json");
-    return false;
   };
   return (
     <div class={css.export}>
-      <Button look="quiet" busy={busy} onClick={() => run(save)}>
+      <ActionButton look="quiet" again act={save}>
         {t().studies.own.settings}
-      </Button>
-      {fault && <Notice kind="fault">{fault}</Notice>}
+      </ActionButton>
     </div>
   );
 }
@@ -268,7 +250,7 @@ function Counts({ study, participants }: FollowedStudy) {
       <h2>{words.board.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a region that scrolls must be reachable with the keyboard */}
       <section class={css.scroll} tabIndex={0} aria-label={words.board.title}>
-        <table class={css.table} data-part="conditions">
+        <table class={`listing ${css.table}`} data-part="conditions">
           <thead>
             <tr>
               <th scope="col">{words.board.condition}</th>
@@ -344,7 +326,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
     setUnsure(false);
     run(async () => {
       try {
-        await addParticipants(studyId, number, pseudonyms, together);
+        await studyApi.addStudyParticipants({ ...ownership(studyId), count: number, pseudonyms, together });
       } catch (thrown) {
         // The answer was lost. Repeated, the request would add others.
         setUnsure(faultOf(thrown).reason === "");
@@ -361,11 +343,14 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
       <h2>{words.title}</h2>
       <div class={css.fields}>
         <TextField label={words.count} value={count} onText={setCount} inputMode="numeric" />
-        <Field label={words.names} hint={words.namesHint} fault={tried && !valid ? words.problem : undefined}>
-          {(joined) => (
-            <textarea {...joined} rows={2} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
-          )}
-        </Field>
+        <TextField
+          label={words.names}
+          hint={words.namesHint}
+          rows={2}
+          value={names}
+          onText={setNames}
+          fault={tried && !valid ? words.problem : undefined}
+        />
       </div>
       {size > 1 && (
         <CheckField
@@ -376,13 +361,10 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
           fault={wrongGroups ? words.wholeGroups(size) : undefined}
         />
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
       {unsure && <Notice kind="hint">{words.unsure}</Notice>}
-      <div>
-        <Button type="submit" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit look="plain" {...{ busy, fault }}>
+        {words.submit}
+      </Submit>
     </form>
   );
 }
@@ -397,7 +379,8 @@ function Tests({ study }: { study: Study }) {
   const valid = Number.isInteger(number) && number >= 1 && number <= MAX_ADDED;
   const add = (event: Event) => {
     event.preventDefault();
-    if (valid) run(() => addTestParticipants(studyId, number).then(() => false));
+    const request = { ...ownership(studyId), count: number, test: true };
+    if (valid) run(() => studyApi.addStudyParticipants(request).then(() => false));
   };
   if (closed && testParticipants === 0) return null;
   return (
@@ -413,12 +396,9 @@ function Tests({ study }: { study: Study }) {
             inputMode="numeric"
             fault={valid ? undefined : t().studies.make.problems.number(1, MAX_ADDED)}
           />
-          {fault && <Notice kind="fault">{fault}</Notice>}
-          <div>
-            <Button type="submit" busy={busy}>
-              {words.submit}
-            </Button>
-          </div>
+          <Submit look="plain" {...{ busy, fault }}>
+            {words.submit}
+          </Submit>
         </form>
       )}
       {testParticipants > 0 && (
@@ -443,7 +423,7 @@ function useLinks({ studyId, known }: LinksProps, isWanted: (link: StudyLink) =>
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
-      setLinks((await linksOf(studyId)).filter(isWanted));
+      setLinks((await studyApi.listStudyLinks(ownership(studyId))).links.filter(isWanted));
       return false;
     });
   useEffect(() => {
@@ -511,7 +491,7 @@ function Participants({ study, participants, onChanged }: OwnStudyProps) {
     <section class={`sheet ${css.part}`}>
       <h2>{words.participants}</h2>
       <section class={css.scroll} aria-label={words.participants}>
-        <table class={css.table} data-part="participants">
+        <table class={`listing ${css.table}`} data-part="participants">
           <thead>
             <tr>
               {[words.number, words.pseudonym, words.conditions, words.stateColumn, words.stage, words.seen].map(
@@ -537,15 +517,6 @@ function Participants({ study, participants, onChanged }: OwnStudyProps) {
   );
 }
 
-const LEFT = [
-  StudyParticipantState.WITHDRAWN,
-  StudyParticipantState.DROPPED_OUT,
-  StudyParticipantState.REMOVED,
-  StudyParticipantState.SCREENED_OUT,
-  StudyParticipantState.LEFT_OVER,
-  StudyParticipantState.COMPLETED,
-];
-
 interface RowProps extends Pick<OwnStudyProps, "study" | "onChanged"> {
   participant: StudyParticipant;
 }
@@ -554,10 +525,12 @@ function Row({ study, participant, onChanged }: RowProps) {
   const words = t().studies.own;
   const { number, pseudonym, panelId, state, step, sessions, connected, conditions, group, dataDeleted } = participant;
   const name = pseudonym || `${words.board.number} ${number}`;
-  const over = LEFT.includes(state);
+  const over = !["invited", "active"].includes(stateName(state));
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
-  const act = async (call: Promise<StudyParticipant | undefined>) => {
-    const changed = await call;
+  const request = { ...ownership(study.studyId), number };
+  /** The participant of the answer is as it is then. */
+  const act = async (call: Promise<{ participant?: StudyParticipant | undefined }>) => {
+    const changed = (await call).participant;
     if (changed) onChanged(changed);
     return false;
   };
@@ -596,7 +569,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                     label={words.remove}
                     confirm={words.removeDo}
                     subject={name}
-                    act={() => act(removeFromStudy(study.studyId, number, false))}
+                    act={() => act(studyApi.removeStudyParticipant(request))}
                   >
                     {words.removeText(name)}
                   </ConfirmButton>
@@ -604,7 +577,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                     label={words.replace}
                     confirm={words.replaceDo}
                     subject={name}
-                    act={() => act(removeFromStudy(study.studyId, number, true))}
+                    act={() => act(studyApi.removeStudyParticipant({ ...request, replace: true }))}
                   >
                     {words.replaceText(name)}
                   </ConfirmButton>
@@ -614,7 +587,7 @@ function Row({ study, participant, onChanged }: RowProps) {
                 label={words.deleteData}
                 confirm={words.deleteDo}
                 subject={name}
-                act={() => act(deleteDataOf(study.studyId, number))}
+                act={() => act(studyApi.deleteStudyParticipant(request))}
               >
                 {words.deleteText(name)}
               </ConfirmButton>

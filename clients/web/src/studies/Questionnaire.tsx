@@ -14,9 +14,9 @@ import type {
   StudySlider,
 } from "../gen/chefshat/v1/study_pb";
 import { t } from "../i18n";
+import { Submit } from "../parts/ActionButton";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { answersOf, type Draft, draftOf, missingItems, shownItems, type Value, withoutHiddenFaults } from "./answers";
 import { Formatted, FormattedQuestion, plainText } from "./Formatted";
@@ -85,12 +85,7 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
         </Table>
       ))}
       {missing.length > 0 && <Notice kind="fault">{words.missing(missing.length)}</Notice>}
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button type="submit" look="main" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
     </form>
   );
 }
@@ -357,7 +352,7 @@ function Slider({ label, slider: { min, max, step, left, right }, value, onEnter
       />
       <div class={css.ends}>
         <span>{left}</span>
-        <span class={css.state} aria-hidden="true">
+        <span class="soft" aria-hidden="true">
           {value === undefined ? words.unset : "✓"}
         </span>
         <span>{right}</span>

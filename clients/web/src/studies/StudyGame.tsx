@@ -1,16 +1,16 @@
 // A game of a study: the table from the participant's seat, without what the study hides.
 
 import { type Signal, signal } from "@preact/signals";
-import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef } from "preact/hooks";
 import { askUntilAnswered } from "../api/asking";
 import { type Fault, isPassing, wordsOf } from "../api/faults";
 import { StudyHide, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
 import { type Hideable, leaveOut } from "../hiding";
 import { t } from "../i18n";
 import { roomOfTicket } from "../lobby/room-like";
-import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
+import { ActionButton } from "../parts/ActionButton";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import { inStudy, labelled } from "../table/labels";
 import { isOver, tableFromRoom } from "../table/model/state";
 import { SeatBanner } from "../table/SeatBanner";
@@ -38,13 +38,8 @@ const HIDEABLE: Partial<Record<StudyHide, Hideable>> = {
 /** The stage of a game. */
 export function StudyGame({ game, title, traces, part }: StudyGameProps) {
   const words = t().studies.game;
-  const [table, setTable] = useState<StudyTable | undefined>(undefined);
-  useEffect(() => {
-    if (game.ticket === "") return setTable(undefined);
-    const started = startStudyTable(game, title);
-    setTable(started);
-    return () => started.stop();
-  }, [game.ticket]);
+  const start = () => (game.ticket === "" ? undefined : startStudyTable(game, title));
+  const table = useStarted(start, game.ticket);
   const hide = game.hide.flatMap((one) => HIDEABLE[one] ?? []).join(" ");
   useLayoutEffect(() => leaveOut((hide === "" ? [] : hide.split(" ")) as Hideable[]), [hide]);
   useLayoutEffect(() => {
@@ -127,14 +122,12 @@ function Table({ session, part, label, game, send }: TableProps) {
 /** The game is over: continues with the study. */
 function ContinueStudy({ part }: { part: Participating }) {
   const words = t().studies;
-  const { busy, fault, run } = useAttempt();
   return (
     <>
       {words.game.over}{" "}
-      <Button look="main" busy={busy} onClick={() => run(() => part.proceed().then(() => false))}>
+      <ActionButton again act={part.proceed}>
         {words.next}
-      </Button>
-      {fault && <Notice kind="fault">{fault}</Notice>}
+      </ActionButton>
     </>
   );
 }

@@ -16,6 +16,7 @@ import {
 } from "../gen/chefshat/v1/study_pb";
 import { leaveOut } from "../hiding";
 import { dateOf, showLanguage, t } from "../i18n";
+import { ActionButton, Submit } from "../parts/ActionButton";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
@@ -24,6 +25,7 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { download } from "../parts/download";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import { useTabMark } from "../parts/tab";
 import type { PageProps } from "../router";
 import { Formatted } from "./Formatted";
@@ -41,12 +43,7 @@ const DELETION_TAKES_MS = 7_200_000n;
 
 /** The page. */
 export function StudyPage({ route }: PageProps<"study">) {
-  const [part, setPart] = useState<Participating | undefined>(undefined);
-  useEffect(() => {
-    const started = startParticipating(route.link);
-    setPart(started);
-    return () => started.stop();
-  }, [route.link]);
+  const part = useStarted(() => startParticipating(route.link), route.link);
   // Other pages of the server are not part of the study.
   useLayoutEffect(() => leaveOut(["pages"]), []);
   return part ? <Taking part={part} /> : null;
@@ -102,13 +99,13 @@ export function Taking({ part }: { part: Participating }) {
     return (
       <section class={`sheet ${css.stage}`}>
         <h1>{words.title}</h1>
-        {part.link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : <p>{t().common.loading}</p>}
+        {part.link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : <p>{t().common.loading}</p>}
       </section>
     );
   }
   return (
     <div class={css.study} data-part="study">
-      {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
+      {part.link.value === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>}
       <Progress view={view} />
       {view.test && <TestNotice key={stageKey(view)} view={view} part={part} />}
       <WithPictures load={part.picture}>
@@ -169,6 +166,8 @@ function TestNotice({ view: { content }, part }: StageProps) {
   const words = t().studies.test;
   const { busy, fault, run } = useAttempt();
   const game = content.case === "game" && !content.value.ended ? content.value : undefined;
+  const waits = content.case === "arrival" || (game && game.waitsFor > 0);
+  const label = content.case === "questionnaire" ? words.skip : waits ? words.alone : game?.ticket && words.end;
   // The end of a game is shown a moment later.
   const [gone, setGone] = useState(false);
   const goOn = () =>
@@ -182,19 +181,9 @@ function TestNotice({ view: { content }, part }: StageProps) {
       <p>
         <b>{words.title}</b> {words.text}
       </p>
-      {!gone && content.case === "questionnaire" && (
+      {!gone && label && (
         <Button busy={busy} onClick={goOn}>
-          {words.skip}
-        </Button>
-      )}
-      {!gone && (content.case === "arrival" || (game && game.waitsFor > 0)) && (
-        <Button busy={busy} onClick={goOn}>
-          {words.alone}
-        </Button>
-      )}
-      {!gone && game?.ticket && (
-        <Button busy={busy} onClick={goOn}>
-          {words.end}
+          {label}
         </Button>
       )}
       {fault && <p>{fault}</p>}
@@ -265,12 +254,7 @@ function Consent({ consent, view, part }: StageProps & { consent: StudyConsent }
         onCheck={setAgreed}
         fault={tried && !agreed ? words.must : undefined}
       />
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button type="submit" look="main" busy={busy}>
-          {words.submit}
-        </Button>
-      </div>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
       <ConfirmButton label={words.decline} confirm={words.declineDo} act={() => part.withdraw(true).then(() => false)}>
         {words.declineText}
       </ConfirmButton>
@@ -354,16 +338,12 @@ function External({ external, part }: { external: StudyExternalQuestionnaire; pa
 }
 
 function Next({ part, children }: { part: Participating; children: ComponentChildren }) {
-  const { busy, fault, run } = useAttempt();
   return (
-    <>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <div>
-        <Button look="main" busy={busy} onClick={() => run(() => part.proceed().then(() => false))}>
-          {children}
-        </Button>
-      </div>
-    </>
+    <div>
+      <ActionButton again act={part.proceed}>
+        {children}
+      </ActionButton>
+    </div>
   );
 }
 

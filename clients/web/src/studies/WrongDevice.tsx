@@ -44,10 +44,10 @@ export function WrongDevice({ fault: { metadata }, retry }: { fault: Fault; retr
         {width > 0 && <p>{words.width(width, Number(own))}</p>}
       </Notice>
       <p>{hasPointer ? words.wider : words.there}</p>
-      <CopyLine label={words.link} text={location.href} />
+      <CopyLine label={t().lobby.moving.link} text={location.href} />
       {needed !== "fine" && (
         <div class={css.code}>
-          <QrCode text={location.href} label={words.qr} />
+          <QrCode text={location.href} label={t().lobby.moving.qr} />
         </div>
       )}
       <div>

@@ -1,44 +1,28 @@
 // The numbers on the progress board of a study.
 
 import { type Study, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+import type { Texts } from "../i18n/texts";
 
-/** The states in the order of the columns. */
-const STATES = [
-  StudyParticipantState.INVITED,
-  StudyParticipantState.ACTIVE,
-  StudyParticipantState.COMPLETED,
-  StudyParticipantState.WITHDRAWN,
-  StudyParticipantState.DROPPED_OUT,
-  StudyParticipantState.REMOVED,
-  StudyParticipantState.SCREENED_OUT,
-  StudyParticipantState.LEFT_OVER,
-] as const;
+/** The states in the order of the columns, with their names in the texts. */
+const STATES = new Map<StudyParticipantState, keyof Texts["studies"]["own"]["state"]>([
+  [StudyParticipantState.INVITED, "invited"],
+  [StudyParticipantState.ACTIVE, "active"],
+  [StudyParticipantState.COMPLETED, "completed"],
+  [StudyParticipantState.WITHDRAWN, "withdrawn"],
+  [StudyParticipantState.DROPPED_OUT, "droppedOut"],
+  [StudyParticipantState.REMOVED, "removed"],
+  [StudyParticipantState.SCREENED_OUT, "screenedOut"],
+  [StudyParticipantState.LEFT_OVER, "leftOver"],
+]);
 
 /** A state's name in the texts. */
 export function stateName(state: StudyParticipantState) {
-  switch (state) {
-    case StudyParticipantState.ACTIVE:
-      return "active";
-    case StudyParticipantState.COMPLETED:
-      return "completed";
-    case StudyParticipantState.WITHDRAWN:
-      return "withdrawn";
-    case StudyParticipantState.DROPPED_OUT:
-      return "droppedOut";
-    case StudyParticipantState.REMOVED:
-      return "removed";
-    case StudyParticipantState.SCREENED_OUT:
-      return "screenedOut";
-    case StudyParticipantState.LEFT_OVER:
-      return "leftOver";
-    default:
-      return "invited";
-  }
+  return STATES.get(state) ?? "invited";
 }
 
 /** The states that participants of a study can have. */
 export function statesOf(study: Study): StudyParticipantState[] {
-  return STATES.filter((state) => state !== StudyParticipantState.LEFT_OVER || study.settings?.groups);
+  return [...STATES.keys()].filter((state) => state !== StudyParticipantState.LEFT_OVER || study.settings?.groups);
 }
 
 /**

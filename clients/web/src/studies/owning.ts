@@ -3,13 +3,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { isSecret } from "../api/secrets";
-import type {
-  Study,
-  StudyLink,
-  StudyParticipant,
-  StudySettings,
-  StudySettingsSchema,
-} from "../gen/chefshat/v1/study_pb";
+import type { Study, StudyLink, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { pathOf } from "../router";
 import { recallObject, remember, remembered } from "../store";
 import { studyApi } from "./client";
@@ -48,57 +42,12 @@ export async function ownStudies(signal: AbortSignal): Promise<Study[]> {
   return [...found.values()].sort((one, other) => Number(other.createdAtMs - one.createdAtMs));
 }
 
-/** The settings of a study, with its pictures. */
-export async function settingsOfStudy(studyId: string): Promise<StudySettings | undefined> {
-  return (await studyApi.getStudy(ownership(studyId))).study?.settings;
-}
-
 /** Creates a study and stores its owner token; returns its id. */
 export async function createStudy(settings: MessageInitShape<typeof StudySettingsSchema>): Promise<string> {
   const { study, ownerToken } = await studyApi.createStudy({ settings });
   if (!study) throw new Error("the server did not say which study it is");
   keepOwnerToken(study.studyId, ownerToken);
   return study.studyId;
-}
-
-/**
- * Adds participants by their codes, or as many as `count` with codes of the server. `together`: they play
- * with each other, in this order.
- */
-export async function addParticipants(
-  studyId: string,
-  count: number,
-  pseudonyms: string[],
-  together: boolean,
-): Promise<StudyLink[]> {
-  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms, together })).links;
-}
-
-export async function addTestParticipants(studyId: string, count: number): Promise<StudyLink[]> {
-  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, test: true })).links;
-}
-
-export async function linksOf(studyId: string): Promise<StudyLink[]> {
-  return (await studyApi.listStudyLinks(ownership(studyId))).links;
-}
-
-/** Removes a participant, and returns it as it is then. */
-export async function removeFromStudy(
-  studyId: string,
-  number: number,
-  replace: boolean,
-): Promise<StudyParticipant | undefined> {
-  return (await studyApi.removeStudyParticipant({ ...ownership(studyId), number, replace })).participant;
-}
-
-/** Deletes the data of a participant, and returns what is left. */
-export async function deleteDataOf(studyId: string, number: number): Promise<StudyParticipant | undefined> {
-  return (await studyApi.deleteStudyParticipant({ ...ownership(studyId), number })).participant;
-}
-
-/** Nobody may begin any more. */
-export async function closeStudy(studyId: string): Promise<void> {
-  await studyApi.closeStudy(ownership(studyId));
 }
 
 /**

@@ -1,10 +1,10 @@
 // A room as spectators see it: public events, with hands if the room shows them.
 
-import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import { t } from "../i18n";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import type { PageProps } from "../router";
 import { useAnnounced } from "./following";
 import { type Spectating, startSpectating } from "./spectating";
@@ -14,12 +14,7 @@ import { WaitingRoom } from "./view/WaitingRoom";
 
 /** The page. */
 export function WatchPage({ route }: PageProps<"watch">) {
-  const [spectating, setSpectating] = useState<Spectating | undefined>(undefined);
-  useEffect(() => {
-    const started = startSpectating(route.roomId);
-    setSpectating(started);
-    return () => started.stop();
-  }, [route.roomId]);
+  const spectating = useStarted(() => startSpectating(route.roomId), route.roomId);
   return spectating ? <Watched spectating={spectating} /> : <p class="soft">{t().common.loading}</p>;
 }
 

@@ -174,23 +174,17 @@ export function expressionWord(label: string): string {
   return isLabel(label) ? t().table.expressions.words[label] : label;
 }
 
+const ROLES = {
+  [Role.CHEF]: "chef",
+  [Role.SOUS_CHEF]: "sousChef",
+  [Role.COOK]: "cook",
+  [Role.WAITER]: "waiter",
+  [Role.DISHWASHER]: "dishwasher",
+} as const;
+
 /** A role's name; empty for none. */
 export function roleWord(role: Role): string {
-  const words = t().common.roles;
-  switch (role) {
-    case Role.CHEF:
-      return words.chef;
-    case Role.SOUS_CHEF:
-      return words.sousChef;
-    case Role.COOK:
-      return words.cook;
-    case Role.WAITER:
-      return words.waiter;
-    case Role.DISHWASHER:
-      return words.dishwasher;
-    default:
-      return "";
-  }
+  return role === Role.UNSPECIFIED ? "" : t().common.roles[ROLES[role]];
 }
 
 /** Why a card cannot be picked. */

@@ -4,10 +4,9 @@ import { useState } from "preact/hooks";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
 import { SelectField, TextField } from "../parts/Field";
-import { Notice } from "../parts/Notice";
 import { addAtTable } from "./hosting";
 import css from "./Tournaments.module.css";
 
@@ -41,7 +40,6 @@ export function AddAtTable({ tournamentId }: { tournamentId: string }) {
         value={name}
         onText={setName}
         maxLength={MAX_NAME}
-        autoComplete="off"
         fault={tried && name.trim() === "" ? t().organise.problems.nameMissing : undefined}
       />
       <SelectField
@@ -53,10 +51,9 @@ export function AddAtTable({ tournamentId }: { tournamentId: string }) {
         ]}
         onPick={setKind}
       />
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button type="submit" busy={busy}>
+      <Submit look="plain" {...{ busy, fault }}>
         {words.submit}
-      </Button>
+      </Submit>
     </form>
   );
 }

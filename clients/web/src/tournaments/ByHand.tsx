@@ -2,6 +2,7 @@
 // can be done about it.
 
 import { useState } from "preact/hooks";
+import { tournamentApi } from "../api/client";
 import {
   type Tournament,
   type TournamentGame,
@@ -11,6 +12,7 @@ import {
 import { t } from "../i18n";
 import { CopyLine } from "../lobby/Invite";
 import { MAX_NAME } from "../lobby/room-form";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
@@ -18,16 +20,7 @@ import { SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import css from "./ByHand.module.css";
 import { type LiveTournament, useGames } from "./following";
-import {
-  callGame,
-  dismissPlaceLink,
-  placeLinks,
-  postponeGame,
-  removeParticipant,
-  replaceByAgent,
-  replaceByPerson,
-  setPaused,
-} from "./hosting";
+import { dismissPlaceLink, ownership, placeLinks, removeParticipant, replaceByAgent, replaceByPerson } from "./hosting";
 import { type HeldPlace, linkToPlace } from "./place";
 import { joinedIn, nameOf } from "./structure";
 
@@ -37,7 +30,8 @@ export function Pause({ tournament }: { tournament: Tournament }) {
   const words = t().organise.own.pause;
   const { busy, fault, run } = useAttempt();
   const act = async () => {
-    await setPaused(tournamentId, !paused);
+    const change = paused ? tournamentApi.resumeTournament : tournamentApi.pauseTournament;
+    await change(ownership(tournamentId));
     return false;
   };
   return (
@@ -72,9 +66,12 @@ export function ManageParticipants({ tournament, agents }: { tournament: Tournam
           <li key={participant}>
             <div>
               <b>{nameOf(tournament, participant)}</b>
-              {withdrawn && <span class="soft small"> {words.withdrawn}</span>}
+              {withdrawn && <span class="soft small"> {t().tournaments.standings.withdrawn}</span>}
               {former.length > 0 && (
-                <span class="soft small"> {words.former(former.map(({ name }) => name).join(", "))}</span>
+                <span class="soft small">
+                  {" "}
+                  {t().tournaments.standings.former(former.map(({ name }) => name).join(", "))}
+                </span>
               )}
             </div>
             <details class={css.change}>
@@ -108,7 +105,7 @@ function PlaceLink({ tournament: { tournamentId }, held, renew }: PlaceLinkProps
   return (
     <Notice kind="good">
       {words.linkFor(held.name)}
-      <CopyLine label={words.link} text={linkToPlace(tournamentId, held)} />
+      <CopyLine label={t().lobby.moving.link} text={linkToPlace(tournamentId, held)} />
       <Button look="quiet" onClick={dismiss}>
         {words.linkSent}
         <span class="visually-hidden"> ({held.name})</span>
@@ -179,14 +176,12 @@ function Replace({ tournament, participant, agents, renew }: ChangeProps & { age
           value={name}
           onText={setName}
           maxLength={MAX_NAME}
-          autoComplete="off"
           fault={tried && name.trim() === "" ? t().organise.problems.nameMissing : undefined}
         />
       )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button type="submit" busy={busy}>
+      <Submit look="plain" {...{ busy, fault }}>
         {words.replaceDo}
-      </Button>
+      </Submit>
     </form>
   );
 }
@@ -222,7 +217,9 @@ function Game({ tournament, game }: { tournament: Tournament; game: TournamentGa
   const { round, table, games } = t().tournaments;
   const { busy, fault, run } = useAttempt();
   const isDue = game.state === TournamentGameState.DUE;
-  const act = (change: () => Promise<void>) => run(() => change().then(() => false));
+  const request = { ...ownership(tournamentId), game: game.game };
+  const act = (change: typeof tournamentApi.callGame | typeof tournamentApi.postponeGame) =>
+    run(() => change(request).then(() => false));
   const names = game.seats.map(({ participant }) => nameOf(tournament, participant));
   return (
     <li>
@@ -233,11 +230,11 @@ function Game({ tournament, game }: { tournament: Tournament; game: TournamentGa
         </span>
       </div>
       <div class={css.row}>
-        <Button busy={busy} onClick={() => act(() => callGame(tournamentId, game.game))}>
+        <Button busy={busy} onClick={() => act(tournamentApi.callGame)}>
           {words.call}
         </Button>
         {isDue && (
-          <Button look="quiet" busy={busy} onClick={() => act(() => postponeGame(tournamentId, game.game))}>
+          <Button look="quiet" busy={busy} onClick={() => act(tournamentApi.postponeGame)}>
             {words.postpone}
           </Button>
         )}

@@ -37,8 +37,8 @@ export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
             linked={!large}
           />
           <KindBadge kind={kind} builtIn={builtInAgent} />
-          {atTable && <span class="soft small">{t().attend.seats.atTable}</span>}
-          {!connected && <span class="soft small">{words.away}</span>}
+          {atTable && <span class="soft small">{t().table.physical.atTable}</span>}
+          {!connected && <span class="soft small">{t().table.presence.away}</span>}
         </li>
       ))}
     </ul>

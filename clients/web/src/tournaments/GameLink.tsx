@@ -21,7 +21,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
     case TournamentGameState.COUNTED:
       return (
         <a class="own-line" href={pathOf({ page: "replay", gameId: game.gameId })}>
-          {words.games.replay}
+          {t().lobby.rooms.replay}
           {number}
           {label}
         </a>
@@ -30,14 +30,14 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
       return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
         <a class="own-line" href={pathOf({ page: "watch", roomId: game.roomId })}>
           <span aria-hidden="true">▶{"\u00a0"}</span>
-          {words.games.watch}
+          {t().lobby.rooms.watch}
           {number}
           {label}
         </a>
       ) : (
         <span>
           <span aria-hidden="true">▶{"\u00a0"}</span>
-          {words.games.playing}
+          {words.states.playing}
           {number}
         </span>
       );

@@ -5,10 +5,9 @@ import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
 import { lastName } from "../lobby/seat";
+import { Submit } from "../parts/ActionButton";
 import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
-import { Notice } from "../parts/Notice";
 import { hostedTournament } from "./hosting";
 import { takePlace } from "./place";
 import css from "./Tournaments.module.css";
@@ -45,22 +44,18 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
         value={code}
         onText={setCode}
         autoCapitalize="characters"
-        autoComplete="off"
         fault={tried && code.trim() === "" ? words.codeMissing : undefined}
       />
       <TextField
-        label={words.name}
+        label={t().lobby.join.name}
         hint={words.nameHint}
         value={name}
         onText={setName}
         maxLength={MAX_NAME}
         autoComplete="nickname"
-        fault={tried && name.trim() === "" ? words.nameMissing : undefined}
+        fault={tried && name.trim() === "" ? t().lobby.join.nameMissing : undefined}
       />
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" type="submit" busy={busy}>
-        {words.submit}
-      </Button>
+      <Submit {...{ busy, fault }}>{words.submit}</Submit>
     </form>
   );
 }

@@ -1,18 +1,17 @@
 // The organiser's part of a tournament's page: inviting, adding those at physical tables, starting,
 // attending to physical games, changing it by hand, closing.
 
+import { tournamentApi } from "../api/client";
 import { agentsFor, useOffered } from "../api/server";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Invite } from "../lobby/Invite";
-import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
+import { ActionButton } from "../parts/ActionButton";
 import { ConfirmButton } from "../parts/ConfirmButton";
-import { Notice } from "../parts/Notice";
 import { AddAtTable } from "./AddAtTable";
 import { ManageGames, ManageParticipants, Pause } from "./ByHand";
 import type { LiveTournament } from "./following";
-import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
+import { hostedTournament, invitationTo, ownership } from "./hosting";
 import { PhysicalGames } from "./PhysicalGames";
 import { isEnded, joinedIn } from "./structure";
 import css from "./Tournaments.module.css";
@@ -29,6 +28,7 @@ export function Organiser({ live }: { live: LiveTournament }) {
   if (!hosted || isEnded(tournament)) return null;
   const words = t().organise.own;
   const open = state === TournamentState.OPEN;
+  const close = () => tournamentApi.closeTournament(ownership(tournamentId));
   const address = invitationTo(tournamentId, hosted.joinCode);
   const command = `chefshat tournament join --agent greedy --name Gustav --server ${location.origin} --code ${hosted.joinCode}`;
   return (
@@ -44,14 +44,14 @@ export function Organiser({ live }: { live: LiveTournament }) {
           title={words.invite}
           code={hosted.joinCode}
           address={address}
-          agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
+          agent={isForAgents(tournament) ? { label: t().lobby.invite.agent, command } : undefined}
         />
       )}
       {state === TournamentState.PLAYING && <Pause tournament={tournament} />}
       <PhysicalGames tournament={tournament} games={games} />
       <ManageParticipants tournament={tournament} agents={agents} />
       {state === TournamentState.PLAYING && <ManageGames live={live} />}
-      <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
+      <ConfirmButton label={words.close} confirm={words.closeDo} act={close}>
         {open ? words.closeOpen : words.closePlaying}
       </ConfirmButton>
     </section>
@@ -62,7 +62,6 @@ export function Organiser({ live }: { live: LiveTournament }) {
 function Begin({ tournament }: { tournament: Tournament }) {
   const { tournamentId, settings } = tournament;
   const words = t().organise.own;
-  const { busy, fault, run } = useAttempt();
   const joined = joinedIn(tournament).length;
   const field = fieldFor(tournament);
   return (
@@ -72,10 +71,7 @@ function Begin({ tournament }: { tournament: Tournament }) {
         {field > joined && joined > 1 && words.filledUp(field, settings?.filler ?? "", field - joined)}
       </p>
       <p class="soft small">{words.startText}</p>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" busy={busy} onClick={() => run(() => startTournament(tournamentId))}>
-        {words.start}
-      </Button>
+      <ActionButton act={() => tournamentApi.startTournament(ownership(tournamentId))}>{words.start}</ActionButton>
     </div>
   );
 }

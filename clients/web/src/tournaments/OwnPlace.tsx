@@ -1,17 +1,16 @@
 // What a participant can do about its own place: postpone a game that is due, leave the tournament,
 // and play on another device.
 
+import { tournamentApi } from "../api/client";
 import { type TournamentGame, TournamentGameState, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { MoveToDevice } from "../lobby/MoveToDevice";
-import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
+import { ActionButton } from "../parts/ActionButton";
 import { ConfirmButton } from "../parts/ConfirmButton";
-import { Notice } from "../parts/Notice";
 import css from "./ByHand.module.css";
 import type { LiveTournament } from "./following";
 import { useGames } from "./following";
-import { forgetPlace, type HeldPlace, leaveTournament, linkToPlace, postponeOwnGame } from "./place";
+import { forgetPlace, type HeldPlace, linkToPlace } from "./place";
 import { seatOf } from "./structure";
 
 interface OwnPlaceProps {
@@ -28,7 +27,7 @@ export function OwnPlace({ held, live, onLeft }: OwnPlaceProps) {
   const open = state === TournamentState.OPEN;
   if (!open && state !== TournamentState.PLAYING) return null;
   const leave = async () => {
-    await leaveTournament(tournamentId, held);
+    await tournamentApi.withdrawParticipant({ tournamentId, ticket: held.ticket });
     if (open) forgetPlace(tournamentId);
     onLeft();
   };
@@ -47,17 +46,13 @@ export function OwnPlace({ held, live, onLeft }: OwnPlaceProps) {
 function Postpone({ held, live }: Omit<OwnPlaceProps, "onLeft">) {
   const { tournamentId } = live.tournament;
   const words = t().tournaments.part;
-  const { busy, fault, run } = useAttempt();
   const next = nextOf(useGames(live), held.participant);
   if (!next) return null;
-  const act = () => postponeOwnGame(tournamentId, held, next.game).then(() => false);
+  const act = () => tournamentApi.postponeGame({ tournamentId, ticket: held.ticket, game: next.game });
   return (
-    <>
-      <Button busy={busy} onClick={() => run(act)}>
-        {words.postpone(words.place(next.round, next.table))}
-      </Button>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-    </>
+    <ActionButton look="plain" again act={act}>
+      {words.postpone(words.place(next.round, next.table))}
+    </ActionButton>
   );
 }
 

@@ -9,6 +9,7 @@ import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
+import { useStarted } from "../parts/started";
 import type { Acting } from "../table/acting";
 import { useAttention } from "../table/attention";
 import { isOver } from "../table/model/state";
@@ -32,15 +33,9 @@ interface ParticipationProps {
 
 /** The page for a participant. */
 export function Participation({ held, live, onLeft, children }: ParticipationProps) {
-  const ended = isEnded(live.tournament);
-  const [part, setPart] = useState<Part | undefined>(undefined);
-  useEffect(() => {
-    // The stream reports games of others that end only after the participant's own game.
-    if (ended) return;
-    const started = startParticipation(held.ticket);
-    setPart(started);
-    return () => started.stop();
-  }, [held.ticket]);
+  // The stream reports games of others that end only after the participant's own game.
+  const start = () => (isEnded(live.tournament) ? undefined : startParticipation(held.ticket));
+  const part = useStarted(start, held.ticket);
   const game = part?.game.value;
   const [left, setLeft] = useState<Acting | undefined>(undefined);
   useEffect(() => {
@@ -134,7 +129,7 @@ function Banner({ part }: { part: Part }) {
       </Notice>
     );
   }
-  return link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : null;
+  return link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : null;
 }
 
 /** During a game: takes the seat back from a substitute. */

@@ -3,9 +3,7 @@
 
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
-import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
-import { Notice } from "../parts/Notice";
+import { ActionButton } from "../parts/ActionButton";
 import { navigateFromHere } from "../router";
 import { takeTable } from "./hosting";
 import { nameOf } from "./structure";
@@ -33,7 +31,6 @@ export function PhysicalGames({ tournament, games }: PhysicalGamesProps) {
 }
 
 function PhysicalGame({ tournament, game }: { tournament: Tournament; game: TournamentGame }) {
-  const { busy, fault, run } = useAttempt();
   const { round, table, games } = t().tournaments;
   const names = game.seats.map(({ participant }) => nameOf(tournament, participant));
   const open = async () => {
@@ -45,10 +42,7 @@ function PhysicalGame({ tournament, game }: { tournament: Tournament; game: Tour
       <p>
         <b>{games.of(`${round(game.round)}, ${table(game.table)}`, game.number)}</b> {names.join(", ")}
       </p>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" busy={busy} onClick={() => run(open)}>
-        {t().attend.room.attend}
-      </Button>
+      <ActionButton act={open}>{t().attend.title}</ActionButton>
     </>
   );
 }

@@ -12,7 +12,7 @@ import { type PageProps, pathOf } from "../router";
 import { type Certificate, certificatesOf } from "./certificate";
 import { type LiveTournament, useGames, useTournament } from "./following";
 import css from "./Results.module.css";
-import { Standings } from "./Standings";
+import { Standings, standingsTitle } from "./Standings";
 import { isEnded, nameIn, playedRounds } from "./structure";
 import { dayWords, dealsWords, formatWord, inShort, settingsWords } from "./words";
 
@@ -35,7 +35,7 @@ export function Results({ live }: { live: LiveTournament }) {
   const [printing, print] = usePrinting();
   return (
     <article class={css.results} data-part="results" data-printing={printing && ""}>
-      <nav class={css.controls} aria-label={words.results.controls}>
+      <nav class={css.controls} aria-label={words.results.title}>
         <Button look="main" onClick={() => window.print()}>
           {words.print}
         </Button>
@@ -52,7 +52,7 @@ export function Results({ live }: { live: LiveTournament }) {
       </header>
       {standings.length > 0 && (
         <section>
-          <h2>{isEnded(tournament) ? words.standings.final : words.standings.title}</h2>
+          <h2>{standingsTitle(tournament)}</h2>
           <Standings tournament={tournament} standings={standings} />
         </section>
       )}

@@ -85,7 +85,7 @@ export function TablesOnWall({ tournament, tables }: Omit<TablesProps, "mine">) 
               {playing && (
                 <>
                   <span aria-hidden="true"> ▶</span>
-                  <span class="visually-hidden"> {words.games.playing}</span>
+                  <span class="visually-hidden"> {words.states.playing}</span>
                 </>
               )}
             </h3>

@@ -36,16 +36,17 @@ export function standingsTitle({ state }: Tournament): string {
 /** The table of standings. */
 export function Standings({ tournament, standings, mine, large = false }: StandingsProps) {
   const words = t().tournaments.standings;
+  const { columns } = t().common;
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   const players = tournament.settings?.rules?.players ?? 4;
   return (
-    <table class={css.standings} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
+    <table class={`listing ${css.standings}`} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
       <caption class="visually-hidden">{standingsTitle(tournament)}</caption>
       <thead>
         <tr>
-          <th scope="col">{words.place}</th>
+          <th scope="col">{columns.place}</th>
           <th scope="col" class={css.name} data-part="standings-name">
-            {words.name}
+            {columns.name}
           </th>
           {knockout && (
             <th scope="col" data-part="standings-detail">
@@ -53,7 +54,7 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
             </th>
           )}
           <th scope="col" class={css.minor} data-part="standings-detail">
-            {words.games}
+            {columns.games}
           </th>
           <th scope="col" title={words.scoreHint}>
             {words.score}
@@ -61,13 +62,13 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
           {!large && (
             <>
               <th scope="col" class={css.minor}>
-                {words.points}
+                {columns.points}
               </th>
               <th scope="col" class={css.minor}>
-                {words.places}
+                {columns.places}
               </th>
               <th scope="col" class={css.minor} title={words.ratingHint}>
-                {words.rating}
+                {columns.rating}
               </th>
             </>
           )}
@@ -116,7 +117,9 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
   const words = t().tournaments.standings;
   const participant = participantOf(tournament, standing.participant);
   if (!participant) return null;
-  const gone = participant.withdrawn ? words.withdrawn : !participant.connected && !isEnded(tournament) && words.away;
+  const gone = participant.withdrawn
+    ? words.withdrawn
+    : !participant.connected && !isEnded(tournament) && t().table.presence.away;
   const remarks = [
     participant.filler && words.filler,
     participant.former.length > 0 && words.former(participant.former.map(({ name }) => name).join(", ")),

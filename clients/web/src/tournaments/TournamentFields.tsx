@@ -88,7 +88,6 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
               value={form.builtIn[agent] ?? ""}
               faultId={atFault(form.builtIn[agent] ?? "") ? `${id}-built-in` : undefined}
               onText={(count) => change({ builtIn: { ...form.builtIn, [agent]: count } })}
-              autoComplete="off"
             />
           ))}
         </div>

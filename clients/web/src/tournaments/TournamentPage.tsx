@@ -72,7 +72,7 @@ function Followed({ followed, tournamentId, wall }: FollowedProps) {
     return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
   }
   if (!live.value) return <p class="soft">{t().common.loading}</p>;
-  const lost = link.value === "lost" && <Notice kind="fault">{t().tournaments.part.lost}</Notice>;
+  const lost = link.value === "lost" && <Notice kind="fault">{t().table.link.lost}</Notice>;
   if (wall) {
     return (
       <>

@@ -34,7 +34,7 @@ export function TournamentsPage() {
   return (
     <div class={css.tournaments}>
       <header class={css.listHead}>
-        <h1>{words.title}</h1>
+        <h1>{t().common.nav.tournaments}</h1>
         <ButtonLink href={pathOf({ page: "newTournament" })} look={none ? "main" : "plain"}>
           {t().organise.link}
         </ButtonLink>

@@ -8,6 +8,7 @@ import { type Following, follow } from "../api/follow";
 import { allPages } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { OrderConfidence, Tournament, TournamentGame, TournamentStanding } from "../gen/chefshat/v1/tournament_pb";
+import { useStarted } from "../parts/started";
 import { isEnded, mergedGames } from "./structure";
 
 /** The data of the stream. */
@@ -22,12 +23,12 @@ export interface LiveTournament {
 export interface FollowedTournament {
   readonly live: Signal<LiveTournament | undefined>;
   readonly following: Following;
+  stop(): void;
 }
 
 /** Follows a tournament while its page is shown. */
 export function useTournament(tournamentId: string): FollowedTournament | undefined {
-  const [followed, setFollowed] = useState<FollowedTournament | undefined>(undefined);
-  useEffect(() => {
+  const start = () => {
     const live = signal<LiveTournament | undefined>(undefined);
     const following = follow(
       (abort) => tournamentApi.followTournament({ tournamentId }, { signal: abort }),
@@ -38,10 +39,9 @@ export function useTournament(tournamentId: string): FollowedTournament | undefi
       },
       { restsWhileHidden: true },
     );
-    setFollowed({ live, following });
-    return () => following.stop();
-  }, [tournamentId]);
-  return followed;
+    return { live, following, stop: following.stop };
+  };
+  return useStarted(start, tournamentId);
 }
 
 const PAGE_SIZE = 500;

@@ -1,5 +1,5 @@
-// Organising a tournament: creating, starting, changing and closing it, and the secrets that this
-// device stores for it. Taking part is in place.ts.
+// Organising a tournament: creating it, changes that this device takes note of, and the secrets that it
+// stores. Taking part is in place.ts.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { tournamentApi } from "../api/client";
@@ -61,22 +61,6 @@ export async function createTournament(settings: MessageInitShape<typeof Tournam
   return tournament.tournamentId;
 }
 
-/** Starts a tournament that this device created. */
-export async function startTournament(tournamentId: string): Promise<void> {
-  await tournamentApi.startTournament(ownership(tournamentId));
-}
-
-/** Closes a tournament that this device created; running games are aborted. */
-export async function closeTournament(tournamentId: string): Promise<void> {
-  await tournamentApi.closeTournament(ownership(tournamentId));
-}
-
-/** Pauses or resumes a tournament that this device created. */
-export async function setPaused(tournamentId: string, paused: boolean): Promise<void> {
-  if (paused) await tournamentApi.pauseTournament(ownership(tournamentId));
-  else await tournamentApi.resumeTournament(ownership(tournamentId));
-}
-
 /** Removes a participant of a tournament that this device created. */
 export async function removeParticipant(tournamentId: string, participant: number): Promise<void> {
   await tournamentApi.removeParticipant({ ...ownership(tournamentId), participant });
@@ -106,16 +90,6 @@ export async function replaceByPerson(tournamentId: string, participant: number,
   keepLinks(tournamentId, (links) => [...links, { ticket, participant, name: name.trim() }]);
 }
 
-/** Postpones a game of a tournament that this device created. */
-export async function postponeGame(tournamentId: string, game: number): Promise<void> {
-  await tournamentApi.postponeGame({ ...ownership(tournamentId), game });
-}
-
-/** Calls a due or void game before all others. */
-export async function callGame(tournamentId: string, game: number): Promise<void> {
-  await tournamentApi.callGame({ ...ownership(tournamentId), game });
-}
-
 /** Adds a participant at a physical table to a tournament that this device created. */
 export async function addAtTable(tournamentId: string, name: string, kind: ParticipantKind): Promise<void> {
   const request = { ...ownership(tournamentId), name: name.trim(), kind };
@@ -134,6 +108,7 @@ export function invitationTo(tournamentId: string, code: string): string {
   return `${location.origin}${pathOf({ page: "tournament", tournamentId })}?code=${encodeURIComponent(code)}`;
 }
 
-function ownership(tournamentId: string) {
+/** The secrets of calls about a tournament that this device created. */
+export function ownership(tournamentId: string) {
   return { tournamentId, ownerToken: hostedTournament(tournamentId)?.ownerToken ?? "" };
 }

@@ -1,5 +1,4 @@
-// Joining and leaving a tournament, and the place that this device stores. Playing is in
-// participation.ts.
+// Joining a tournament, and the place that this device stores. Playing is in participation.ts.
 
 import { tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
@@ -33,16 +32,6 @@ export function asPlace(value: unknown): HeldPlace | null {
 /** Deletes this device's place in a tournament. */
 export function forgetPlace(tournamentId: string): void {
   remember(`tournament.${tournamentId}`, null);
-}
-
-/** Leaves a tournament: before the start the place is free again. */
-export async function leaveTournament(tournamentId: string, { ticket }: HeldPlace): Promise<void> {
-  await tournamentApi.withdrawParticipant({ tournamentId, ticket });
-}
-
-/** Moves a game of this device's participant to the end of the queue. */
-export async function postponeOwnGame(tournamentId: string, { ticket }: HeldPlace, game: number): Promise<void> {
-  await tournamentApi.postponeGame({ tournamentId, ticket, game });
 }
 
 /** Links that bring a place to another device. */

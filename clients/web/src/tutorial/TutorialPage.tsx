@@ -6,11 +6,10 @@ import { SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { playNow } from "../lobby/play-now";
 import { lastName } from "../lobby/seat";
+import { ActionButton } from "../parts/ActionButton";
 import { announce } from "../parts/Announcer";
-import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
 import { Shows } from "../parts/marks";
-import { Notice } from "../parts/Notice";
 import { useAnnounced } from "../table/following";
 import { actionOf } from "../table/model/actions";
 import { type Card, without } from "../table/model/cards";
@@ -74,9 +73,9 @@ export function TutorialPage() {
       decision={decision}
       untimed
       refusal={words.notThis}
-      caption={words.title}
+      caption={t().common.nav.tutorial}
       banner={
-        <section class={css.lesson} data-part="lesson" aria-label={words.title}>
+        <section class={css.lesson} data-part="lesson" aria-label={t().common.nav.tutorial}>
           <Shows what="lesson" />
           <p class={`${css.count} number`}>{words.step(at + 1, LESSONS.length)}</p>
           <p class={css.words}>{ready ? text : words.watch}</p>
@@ -87,9 +86,9 @@ export function TutorialPage() {
           )}
           {ready && at === LESSONS.length - 1 && (
             <>
-              <PlayNow />
+              <ActionButton act={() => playNow(lastName())}>{words.play}</ActionButton>
               <ButtonLink look="quiet" href="/">
-                {words.toLobby}
+                {t().common.toLobby}
               </ButtonLink>
             </>
           )}
@@ -97,19 +96,6 @@ export function TutorialPage() {
       }
       onAnswer={goOn}
     />
-  );
-}
-
-/** Starts a first game directly, without the lobby. */
-function PlayNow() {
-  const { busy, fault, run } = useAttempt();
-  return (
-    <>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" busy={busy} onClick={() => run(() => playNow(lastName()))}>
-        {t().tutorial.play}
-      </Button>
-    </>
   );
 }
 

@@ -7,7 +7,7 @@ import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
 import { type GameEvent, GameEventSchema } from "../gen/chefshat/v1/event_pb";
 import { ParticipantKind, ParticipantSchema } from "../gen/chefshat/v1/room_pb";
 import { Role } from "../gen/chefshat/v1/rules_pb";
-import type { Texts } from "../i18n/en";
+import type { Texts } from "../i18n/texts";
 import { type Move, moveOf } from "../table/model/actions";
 import { cardsFromNumbers } from "../table/model/cards";
 import { emptyTable, type SeatState, seatFromParticipant, type TableState } from "../table/model/state";

@@ -2,6 +2,7 @@
 // never meets a condition's name; another one withdraws; the researcher's page shows both.
 
 import { readFileSync } from "node:fs";
+import type { BrowserContextOptions, Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { StudyHide, StudyParticipantState, StudyPointer } from "../../src/gen/chefshat/v1/study_pb";
 import { inaccessible, PHONE, tooWide } from "./checks";
@@ -11,6 +12,21 @@ import { browser, person, server, until, useStage } from "./stage";
 import { Tap } from "./tap";
 
 useStage();
+
+/** Opens the page of a study with its key. */
+async function researcherOf(study: { studyId: string; ownerToken: string }, options: BrowserContextOptions = {}) {
+  const researcher = await person(browser, options);
+  await researcher.page.goto(`${server.url}/studies/${study.studyId}`);
+  await researcher.page.getByLabel("Owner token").fill(study.ownerToken);
+  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  return researcher;
+}
+
+async function withdraw(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Withdraw from the study…" }).click();
+  await page.getByRole("button", { name: "Withdraw now" }).click();
+  await page.getByText("You have withdrawn.").waitFor();
+}
 
 test("a participant goes through all stages, on two devices, without meeting a condition", async () => {
   const { studyId, ownerToken } = await newStudy(server, { participants: 2 });
@@ -66,16 +82,11 @@ test("a participant goes through all stages, on two devices, without meeting a c
   // The other participant withdraws.
   const other = await person(browser);
   await other.page.goto(links[1] ?? "");
-  await other.page.getByRole("button", { name: "Withdraw from the study…" }).click();
-  await other.page.getByRole("button", { name: "Withdraw now" }).click();
-  await other.page.getByText("You have withdrawn.").waitFor();
+  await withdraw(other.page);
   await tap.stop();
 
   // The researcher's page shows both.
-  const researcher = await person(browser);
-  await researcher.page.goto(`${server.url}/studies/${studyId}`);
-  await researcher.page.getByLabel("Owner token").fill(ownerToken);
-  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  const researcher = await researcherOf({ studyId, ownerToken });
   const rows = researcher.page.locator('[data-part~="participants"] tbody tr');
   await expect.poll(() => rows.allInnerTexts().then((texts) => texts.join())).toMatch(/completed[\s\S]*withdrawn/);
   expect(await inaccessible(researcher.page)).toEqual([]);
@@ -113,11 +124,7 @@ test("two people wait for each other, play together, and one goes on with agents
   await first.page.reload();
   await second.page.goto(links[1] ?? "");
   await agree(second.page);
-  const leave = async () => {
-    await second.page.getByRole("button", { name: "Withdraw from the study…" }).click();
-    await second.page.getByRole("button", { name: "Withdraw now" }).click();
-    await second.page.getByText("You have withdrawn.").waitFor();
-  };
+  const leave = () => withdraw(second.page);
   const [taken] = await Promise.all([playGame(first.page), playGame(second.page, 1).then(leave)]);
   expect(taken).toBeGreaterThan(0);
   // The next game has an agent in the place of the other.
@@ -204,10 +211,7 @@ test("a researcher tests a study: every page, without answering and playing, apa
       { stage: { case: "text", value: { title: "About this study", text: "Thank you." } } },
     ],
   });
-  const researcher = await person(browser, { viewport: PHONE });
-  await researcher.page.goto(`${server.url}/studies/${studyId}`);
-  await researcher.page.getByLabel("Owner token").fill(ownerToken);
-  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  const researcher = await researcherOf({ studyId, ownerToken }, { viewport: PHONE });
   await researcher.page.getByLabel("Number of test participants").fill("2");
   await researcher.page.getByRole("button", { name: "Add test participants" }).click();
   await researcher.page.getByRole("button", { name: "Download the data of test participants (ZIP)" }).waitFor();
@@ -220,8 +224,7 @@ test("a researcher tests a study: every page, without answering and playing, apa
   await page.getByText("Test participation").waitFor();
   await page.getByRole("link", { name: "our page" }).waitFor();
   expect(await inaccessible(page)).toEqual([]);
-  await page.getByLabel("I have read this text").press("Space");
-  await page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+  await agree(page);
   await page.getByRole("textbox", { name: "How old are you?" }).fill("3");
   await page.getByRole("button", { name: "Send the answers" }).click();
   await page.getByText("This is none of the numbers that can be answered.").waitFor();
@@ -243,8 +246,7 @@ test("a researcher tests a study: every page, without answering and playing, apa
   // The other one skips the questions, and so is not over 30.
   const other = await person(browser);
   await other.page.goto(`${server.url}/study/${links[1]?.link}`);
-  await other.page.getByLabel("I have read this text").press("Space");
-  await other.page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+  await agree(other.page);
   await other.page.getByRole("button", { name: "Skip the questions" }).click();
   await other.page.locator("[data-decision]").waitFor();
 
@@ -264,10 +266,7 @@ test("a researcher deletes a study with a participant in the middle of it, and i
   await participant.page.goto(`${server.url}/study/${links[0]?.link}`);
   await consent(participant.page);
 
-  const { page, faults } = await person(browser, { viewport: PHONE });
-  await page.goto(`${server.url}/studies/${studyId}`);
-  await page.getByLabel("Owner token").fill(ownerToken);
-  await page.getByRole("button", { name: "Use this key" }).click();
+  const { page, faults } = await researcherOf({ studyId, ownerToken }, { viewport: PHONE });
   await page.getByRole("button", { name: "Delete the study…" }).press("Enter");
   await page.getByRole("button", { name: "Delete everything now" }).press("Enter");
   await page.getByText("Participants are in the middle of this study.").waitFor();
@@ -304,10 +303,7 @@ test("people of a panel take part by the open link, once each, and go on where t
   const deletesAtMs = BigInt(Date.UTC(2031, 11, 30, 11));
   const plan = { participants: 1, factors: [], conditions: [condition], stages, recruiting, deletesAtMs };
   const { studyId, ownerToken } = await newStudy(server, plan);
-  const researcher = await person(browser);
-  await researcher.page.goto(`${server.url}/studies/${studyId}`);
-  await researcher.page.getByLabel("Owner token").fill(ownerToken);
-  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  const researcher = await researcherOf({ studyId, ownerToken });
   await researcher.page.getByText("The study is deleted with all its data on ").waitFor();
   const shown = researcher.page.locator('[data-part~="open-link"] [data-part~="invite-link"]');
   const asked = ((await shown.textContent()) ?? "").trim();
@@ -353,16 +349,14 @@ test("people of a panel take part by the open link, once each, and go on where t
   const onward = ({ page }: typeof bo) => page.locator('[data-part~="go-on"]').getAttribute("href");
   expect(await onward(bo)).toBe("https://panel.example/left");
 
-  await ada.page.getByLabel("I have read this text").check();
-  await ada.page.getByRole("button", { name: "Agree and continue" }).click();
+  await agree(ada.page);
   await ada.page.getByRole("button", { name: "Continue" }).click();
   await ada.page.getByRole("link", { name: "Go on to panel.example" }).waitFor();
   expect(await onward(ada)).toBe("https://panel.example/done?id=ada");
   expect(await inaccessible(ada.page)).toEqual([]);
 
   // Somebody who has read the text meanwhile finds no place.
-  await slow.page.getByLabel("I have read this text").check();
-  await slow.page.getByRole("button", { name: "Agree and continue" }).click();
+  await agree(slow.page);
   await slow.page.getByText("All places in this study are taken.").waitFor();
   expect(await onward(slow)).toBe("https://panel.example/full");
   const late = await person(browser);
@@ -406,9 +400,7 @@ test("a study that needs a computer begins there, and on a phone says so", async
   await needed.waitFor();
   expect(await begun()).toEqual([[StudyParticipantState.ACTIVE, 1]]);
   await agree(computer.page);
-  await phone.page.getByRole("button", { name: "Withdraw from the study…" }).click();
-  await phone.page.getByRole("button", { name: "Withdraw now" }).click();
-  await phone.page.getByText("You have withdrawn.").waitFor();
+  await withdraw(phone.page);
   await computer.page.getByText("You have withdrawn.").waitFor();
   expect([...phone.faults, ...computer.faults]).toEqual([]);
 });

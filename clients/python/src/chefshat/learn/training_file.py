@@ -117,7 +117,7 @@ def network_info(
     trained_by: str,
     *,
     input: Literal["classic", "table"],
-    output: Literal["turns", "actions"],
+    output: Literal["turns", "actions", "points"],
     masked: bool,
 ) -> NetworkInfo:
     """Describes a network trained under a rule set, without an activation of its outputs."""

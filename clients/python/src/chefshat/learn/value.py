@@ -18,7 +18,6 @@ import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
 import optax
-from google.protobuf.json_format import MessageToJson
 from tqdm import tqdm
 
 from chefshat import join_options, pb
@@ -26,7 +25,8 @@ from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import features, network, runs
 from chefshat.learn.mlp import Mlp, Params, to_layers
-from chefshat.learn.network import Network, NetworkFileError, NetworkInfo
+from chefshat.learn.network import Network, NetworkFileError
+from chefshat.learn.training_file import network_info
 from chefshat.opponents import selected
 from chefshat.vector import VectorEnv
 
@@ -99,18 +99,8 @@ def _train(options: argparse.Namespace) -> Learned:
         policy, options.policy, options.decisions, options.seed, options.rules, join_options.server_if_any(options)
     )
     params, found = learn(samples, options.width, options.epochs, options.seed, float(max(rules.points)))
-    info = NetworkInfo(
-        input="table",
-        output="points",
-        output_activation="none",
-        masked=True,
-        players=rules.players,
-        faces=rules.faces,
-        jokers=rules.jokers,
-        rules=MessageToJson(rules, indent=None, sort_keys=True),
-        name=f"value of {policy.info.name or options.policy}"[:64],
-        trained_by=runs.trained_by("", options.trained_by),
-    )
+    name = f"value of {policy.info.name or options.policy}"[:64]
+    info = network_info(rules, name, runs.trained_by("", options.trained_by), input="table", output="points", masked=True)
     network.save(options.out, to_layers(params), info, dtype=np.float16)
     return found
 

@@ -13,7 +13,6 @@ import cv2
 from chefshat_robot.cli import CommandError
 from chefshat_robot.deck import Card
 
-from .camera import Camera
 from .events import (
     Cleared,
     Doubt,
@@ -26,9 +25,10 @@ from .events import (
     TakenBack,
     to_json,
 )
-from .frames import SOURCE_HELP, Frame, SourceError, add_source_options, open_source, wish_of
+from .frames import SOURCE_HELP, Frame
 from .perception import Perception
-from .recording import Recorder, replay
+from .recording import replay
+from .watching import add_options, in_words, watched
 
 PATIENCE_S = 5.0
 """A doubt is left out after so long, in s."""
@@ -55,11 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = _DESCRIPTION
     parser.add_argument("source", nargs="?", help=SOURCE_HELP)
     parser.add_argument("--replay", type=Path, metavar="DIR", help="decide again from the recording in this folder")
-    parser.add_argument("--camera", type=Path, metavar="FILE", help="the camera's calibration, from `chefshat-robot calibrate`")
-    parser.add_argument("--deck", type=int, choices=range(7), metavar="0..6", help="ignore the cards of other decks")
-    add_source_options(parser)
-    parser.add_argument("--record", type=Path, metavar="DIR", help="write what is seen to this folder")
-    parser.add_argument("--record-frames", action="store_true", help="with --record: write the frames too")
+    add_options(parser)
     parser.add_argument("--doubts", type=Path, metavar="DIR", help="write the picture of each doubt to this folder")
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
@@ -68,31 +64,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Runs `perceive`."""
     if (arguments.source is None) == (arguments.replay is None):
         raise CommandError("give a camera's number, a video or a folder of pictures, or --replay with a recording")
-    if arguments.record_frames and arguments.record is None:
-        raise CommandError("--record-frames needs --record with a folder")
     try:
         if arguments.replay is not None:
-            is_found = _print_all(replay(arguments.replay), arguments.json, None)
-            return _end(is_found)
-        camera = Camera.load(arguments.camera) if arguments.camera is not None else None
-        frames = open_source(arguments.source, wish_of(arguments))
-        if arguments.doubts is not None:
-            arguments.doubts.mkdir(parents=True, exist_ok=True)
-        if arguments.record is None:
-            is_found = _print_all(_watch(Perception(camera, arguments.deck), frames), arguments.json, arguments.doubts)
-        else:
-            with Recorder(arguments.record, arguments.deck, arguments.record_frames) as recorder:
-                is_found = _print_all(
-                    _watch(Perception(camera, arguments.deck, recorder), frames), arguments.json, arguments.doubts
-                )
-    except FileExistsError as error:
-        raise CommandError(f"{error.filename} exists; give a folder without a recording") from error
-    except (SourceError, ValueError) as error:
-        raise CommandError(str(error)) from error
+            with in_words():
+                return _end(_print_all(replay(arguments.replay), arguments.json, None))
+        with watched(arguments) as (perception, frames):
+            if arguments.doubts is not None:
+                arguments.doubts.mkdir(parents=True, exist_ok=True)
+            return _end(_print_all(_watch(perception, frames), arguments.json, arguments.doubts))
     except KeyboardInterrupt:
         print(file=sys.stderr)
         return 0
-    return _end(is_found)
 
 
 def _end(is_found: bool) -> int:

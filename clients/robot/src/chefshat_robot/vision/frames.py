@@ -143,14 +143,19 @@ def _stream_frames(address: str) -> Iterator[Frame]:
 def _live_frames(capture: cv2.VideoCapture, ended: str) -> Iterator[Frame]:
     """The frames of a camera, by when they arrive; `ended` says why there are no more."""
     started = time.monotonic()
-    index = 0
+    for index, image in enumerate(_pictures(capture)):
+        yield Frame(index, time.monotonic() - started, image)
+    raise SourceError(ended)
+
+
+def _pictures(capture: cv2.VideoCapture) -> Iterator[Picture]:
+    """The pictures of a camera or video, until it has no more."""
     try:
         while True:
             read, image = capture.read()
             if not read:
-                raise SourceError(ended)
-            yield Frame(index, time.monotonic() - started, np.asarray(image, dtype=np.uint8))
-            index += 1
+                return
+            yield np.asarray(image, dtype=np.uint8)
     finally:
         capture.release()
 
@@ -168,17 +173,4 @@ def _video_frames(path: Path, fps: float | None) -> Iterator[Frame]:
     if not capture.isOpened():
         raise SourceError(f"{path} is not a video that can be read; convert it to MP4 (H.264)")
     rate = fps or capture.get(cv2.CAP_PROP_FPS) or DEFAULT_FPS
-
-    def frames() -> Iterator[Frame]:
-        index = 0
-        try:
-            while True:
-                read, image = capture.read()
-                if not read:
-                    return
-                yield Frame(index, index / rate, np.asarray(image, dtype=np.uint8))
-                index += 1
-        finally:
-            capture.release()
-
-    return frames()
+    return (Frame(index, index / rate, image) for index, image in enumerate(_pictures(capture)))

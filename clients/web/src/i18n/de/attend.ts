@@ -1,7 +1,7 @@
 // German texts of attend/: the attendant of a table with real cards.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 
@@ -45,14 +45,12 @@ export const attend: Texts["attend"] = {
   },
   violation: {
     label: "Nicht erlaubt",
-    of: (name, text) => (name ? `${name}: ${text}` : text),
     todo: "Es zählt nicht. Lass die Karten zurücknehmen oder berichtige, was falsch gelesen wurde.",
     takenBack: "Zurückgenommen",
     reenter: "Eingeben, was wirklich dort liegt",
     correct: "Eine frühere Meldung berichtigen",
   },
   questions: {
-    title: "Fragen",
     picture: "Was die Kamera sieht",
     withdraw: "Keine Antwort",
     words: (text) => {
@@ -91,7 +89,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Wer",
     face: "Wert",
-    jokerAlone: "ein einzelner Joker",
     number: "Wie viele",
     jokers: "Joker dazu",
     fewer: (what) => `Weniger: ${what}`,
@@ -104,7 +101,6 @@ export const attend: Texts["attend"] = {
     passes: (name) => `${name} passt`,
     passWithdrawn: (name) => `${name} nimmt das Passen zurück`,
     clearedText: "Die Pizza ist fertig, und die Karten wurden vom Brett genommen.",
-    cleared: "Das Brett wurde geleert",
     declares: (name) => `${name} sagt an`,
     nobodyDeclares: "Niemand sagt an",
     giftUnseen: (name) => `${name} hat gegeben, Karten nicht gesehen`,
@@ -166,24 +162,18 @@ export const attend: Texts["attend"] = {
       }),
   },
   seats: {
-    title: "Sitzplätze",
-    atTable: "am Tisch",
     remote: "online",
     handKnown: "Blatt bekannt",
     handUnknown: "Blatt nicht bekannt",
     passed: "gepasst",
     next: "ist dran",
   },
-  board: "Auf dem Brett",
   link: {
     title: "Auf einem Tablet neben dem Tisch",
     text: "Wer diese Adresse hat, kann für den Tisch melden. Zeige sie nur denen, die ihn betreuen.",
-    address: "Adresse",
     qr: "QR-Code der Ansicht für die Tischbetreuung",
   },
   room: {
-    attend: "Den Tisch betreuen",
-    replay: "Replay",
     realCards: "echte Karten",
   },
 };

@@ -2,8 +2,8 @@
 // game. The same word stands for the same thing in all parts: face "Wert", board "Brett", hand
 // "Blatt", play "spielen", pass "passen", declare "ansagen", exchange "Tausch", game "Partie".
 
-import type { Texts } from "../en";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 
@@ -93,21 +93,28 @@ export const common: Texts["common"] = {
     "Tomate",
     "Mozzarella",
   ],
-  joker: "Joker",
   cards: (count) => plural(count, { one: "# Karte", other: "# Karten" }),
   points: (count) => plural(count, { one: "# Punkt", other: "# Punkte" }),
   place: ordinals("de", { other: "." }),
   seat: (seat) => `Sitzplatz ${seat + 1}`,
+  /** Headings of tables. */
+  columns: {
+    place: "Platz",
+    name: "Name",
+    games: "Partien",
+    points: "Punkte",
+    places: "Platzierungen",
+    rating: "Wertung",
+  },
   close: "Schließen",
   cancel: "Abbrechen",
   changedMeanwhile: (before, now) =>
     `Es wurde nichts getan: ${now} hat inzwischen den Platz von ${before} eingenommen.`,
-  back: "Zurück",
   copy: "Kopieren",
   copied: "Kopiert",
   loading: "Wird geladen…",
-  more: "Mehr",
   showMore: "Mehr anzeigen",
+  toLobby: "Zur Lobby",
   pageNotLoaded: "Diese Seite konnte nicht geladen werden. Prüfe deine Verbindung und lade sie neu.",
   outdated: {
     text: "Der Server wurde aktualisiert, und diese Seite ist noch die alte Version. Deine Plätze und Spiele bleiben, wenn du die neue lädst.",
@@ -118,5 +125,5 @@ export const common: Texts["common"] = {
     text: "Ein Fehler der Seite selbst, nicht deiner Verbindung. Dein Platz und alles am Tisch bleiben erhalten.",
     reload: "Neu laden",
   },
-  notFound: { title: "Seite nicht gefunden", text: "Unter dieser Adresse gibt es nichts.", link: "Zur Lobby" },
+  notFound: { title: "Seite nicht gefunden", text: "Unter dieser Adresse gibt es nichts." },
 };

@@ -1,17 +1,15 @@
 // German texts of lobby/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("de");
 
 export const lobby: Texts["lobby"] = {
-  title: "Lobby",
   quick: {
     title: "Setz dich und spiele",
     text: "Du und drei Agenten backt Pizzas. Wer zuerst keine Karten mehr hat, wird Chef.",
-    name: "Dein Name",
     guest: "Gast",
     roomOf: (name) => `Tisch von ${name}`,
     start: "Jetzt spielen",
@@ -25,7 +23,6 @@ export const lobby: Texts["lobby"] = {
     code: "Beitrittscode",
     codeMissing: "Gib den Code ein, den du bekommen hast.",
     go: "Weiter",
-    codeIs: "Beitrittscode",
     name: "Dein Name",
     nameHint: "Alle am Tisch sehen ihn.",
     nameMissing: "Gib einen Namen ein.",
@@ -58,10 +55,8 @@ export const lobby: Texts["lobby"] = {
     free: "frei",
     reservedFor: (kind) => `frei für: ${kind}`,
     you: "(du)",
-    away: "nicht verbunden",
   },
   tournaments: {
-    title: "Turniere",
     open: "Anmeldung offen",
     playing: (over, games) => `Läuft: ${over} von ${games} Partien`,
     none: "Kein Turnier ist offen oder läuft. Erstelle eines und lade Personen und Agenten ein.",
@@ -70,7 +65,6 @@ export const lobby: Texts["lobby"] = {
   invite: {
     title: "Andere einladen",
     text: "Schick die Adresse, lies den Code vor oder lass andere den QR-Code mit dem Handy scannen.",
-    code: "Beitrittscode",
     link: "Adresse",
     agent: "Für einen Agenten, in einem Terminal",
     qr: "QR-Code der Adresse",
@@ -79,8 +73,6 @@ export const lobby: Texts["lobby"] = {
       " und öffne diese Seite unter dem Namen oder der Adresse dieses Rechners; sie steht dann im Link und im QR-Code.",
   },
   door: {
-    sitDown: "Hinsetzen",
-    toLobby: "Zur Lobby",
     close: "Raum schließen",
     closeSure: "Niemand wird darin spielen können.",
     closePlaying: "Die Partie endet für alle, ohne Ergebnis.",
@@ -127,7 +119,6 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "Du hast diesen Raum erstellt. Wenn du die Partie beendest, endet sie für alle, ohne Ergebnis.",
     stay: "Bleiben",
     doIt: "Gehen",
-    close: "Raum schließen",
     end: "Partie beenden",
   },
   make: {
@@ -150,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Eine Person am Tisch",
       atTableRobot: "Ein Roboter am Tisch",
-      remoteHuman: "Online: frei für eine Person",
-      remoteAnybody: "Online: frei für alle",
-      remoteAgent: "Online: frei für einen Agenten",
-      remoteRobot: "Online: frei für einen Roboter",
-      remoteModel: "Online: frei für ein Sprachmodell",
+      remote: (free) => `Online: ${free}`,
       human: "Frei für eine Person",
       anybody: "Frei für alle",
       agent: "Frei für einen Agenten",

@@ -1,7 +1,7 @@
 // German texts of creating and running a tournament, in tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 
@@ -96,7 +96,6 @@ export const organise: Texts["organise"] = {
     title: "Du leitest dieses Turnier",
     text: "Nur dieses Gerät kann es starten, ändern und schließen.",
     invite: "Teilnehmer einladen",
-    agent: "Für einen Agenten, in einem Terminal",
     joined: (count) => plural(count, { one: "# Anmeldung.", other: "# Anmeldungen." }),
     startsAt: (count) => `Es beginnt automatisch bei ${count} Anmeldungen.`,
     start: "Turnier starten",
@@ -126,8 +125,6 @@ export const organise: Texts["organise"] = {
     people: {
       title: "Teilnehmer ändern",
       change: "Ändern…",
-      withdrawn: "gegangen",
-      former: (names) => `vorher: ${names}`,
       remove: "Entfernen…",
       removeDo: "Jetzt entfernen",
       removeOpen: (name) => `${name} entfernen? Der Platz wird frei. Wer den Code hat, kann sich wieder anmelden.`,
@@ -139,7 +136,6 @@ export const organise: Texts["organise"] = {
       newName: "Name der anderen Person",
       replaceDo: "Ersetzen",
       linkFor: (name) => `Schick diesen Link nur an ${name}; er enthält den Platz.`,
-      link: "Link",
       linkSent: "Ich habe ihn weitergegeben",
     },
     games: {

@@ -1,12 +1,11 @@
 // German texts of people/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 
 export const people: Texts["people"] = {
-  title: "Bestenliste",
   text: "Alle, die auf diesem Server eine gewertete Partie gespielt haben. Namen sind frei gewählt; gleiche unterscheidet ein Schlüssel.",
   ratedGames: (games) => plural(games, { one: "# gewertete Partie", other: "# gewertete Partien" }),
   kinds: { label: "Wer", all: "Alle", human: "Personen", robot: "Roboter", agent: "Agenten", model: "Sprachmodelle" },
@@ -17,15 +16,7 @@ export const people: Texts["people"] = {
   none: "Hier hat noch niemand eine gewertete Partie gespielt.",
   noneOfThese: "Niemand passt zu diesen Filtern. Wähle weniger Partien oder alle.",
   toLobby: "Geh in die Lobby und spiele eine",
-  columns: {
-    place: "Platz",
-    name: "Name",
-    rating: "Wertung",
-    ratingHint: "Geschätzte Spielstärke, ± ihre Unsicherheit (95 %)",
-    games: "Partien",
-    places: "Platzierungen",
-    range: (from, to) => `zwischen ${from} und ${to}`,
-  },
+  ratingHint: "Geschätzte Spielstärke, ± ihre Unsicherheit (95 %)",
   order: "Sortiert nach einer vorsichtigen Schätzung: Wertung minus zwei Standardabweichungen.",
   truncated: (count) => `Nur die ersten ${count} werden gezeigt.`,
   which: {
@@ -58,7 +49,6 @@ export const people: Texts["people"] = {
     unrated: "Noch keine gewerteten Partien.",
     notListed: (lines) => `Nicht unter den ersten ${lines} der Bestenliste.`,
     rated: (place) => `Platz ${place} der Bestenliste`,
-    rating: "Wertung",
     ratingRange: (from, to) => `Die Spielstärke liegt mit 95 % Sicherheit zwischen ${from} und ${to}.`,
     games: "Beendete Partien",
     wins: "Gewonnen",
@@ -73,7 +63,6 @@ export const people: Texts["people"] = {
     columns: { date: "Wann", place: "Platz", points: "Punkte", game: "Partie" },
     against: "Gegen",
     aborted: "abgebrochen",
-    replay: "Replay",
     of: (room, date) => `${room}, ${date}`,
     toLeaderboard: "Zur Bestenliste",
   },

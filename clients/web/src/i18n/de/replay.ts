@@ -1,10 +1,9 @@
 // German texts of replay/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const replay: Texts["replay"] = {
   title: "Replay",
-  controls: "Replay",
   first: "Zum Anfang",
   before: "Ein Schritt zurück",
   play: "Abspielen",
@@ -34,7 +33,6 @@ export const replay: Texts["replay"] = {
     caption: (rollouts) =>
       `Mittlere Punkte des Shifts und Standardfehler, aus ${rollouts.toLocaleString("de")} Partien, von Greedy-Agenten weitergespielt`,
     action: "Aktion",
-    points: "Punkte",
     value: (points, error) => `${points.toFixed(2)} ± ${error.toFixed(2)}`.replaceAll(".", ","),
     taken: "gespielt",
     best: "beste",

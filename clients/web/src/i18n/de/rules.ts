@@ -1,6 +1,6 @@
 // German texts of the rules in short.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const rules: Texts["rules"] = {
   title: "Die Regeln in Kürze",

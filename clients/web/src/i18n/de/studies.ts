@@ -1,14 +1,13 @@
 // German texts of studies, in studies/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 
 export const studies: Texts["studies"] = {
   title: "Studie",
   next: "Weiter",
-  lost: "Verbindung verloren. Wird wiederhergestellt…",
   progress: (step, steps) => `Schritt ${step} von ${steps}`,
   elsewhere: {
     title: "Sie machen auf einem anderen Gerät oder einer anderen Seite weiter",
@@ -23,8 +22,6 @@ export const studies: Texts["studies"] = {
     there: "Öffnen Sie dort diesen Link. Hier hat nichts begonnen, und nichts hat sich geändert.",
     wider:
       "Machen Sie das Fenster breiter, drehen Sie das Gerät, oder öffnen Sie diesen Link auf einem größeren. Hier hat nichts begonnen, und nichts hat sich geändert.",
-    link: "Link",
-    qr: "QR-Code des Links",
     retry: "Erneut versuchen",
   },
   consent: {

@@ -2,8 +2,8 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import type { Texts } from "../en";
 import { numerals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("de");
 const number = numerals("eins zwei drei vier fünf sechs sieben acht neun zehn elf zwölf dreizehn vierzehn fünfzehn");
@@ -176,7 +176,6 @@ export const table: Texts["table"] = {
     suggested: (move) => `Vorschlag: ${move}`,
     points: (points, error) => `${points} ± ${error} Punkte`,
     sending: "Wird gesendet…",
-    notYourTurn: "Du bist nicht dran.",
     noPass: "Wähle Karten: Wer eröffnet, darf nicht passen.",
     mustPlay: "Lange hat niemand gespielt: Du musst spielen.",
   },
@@ -252,7 +251,6 @@ export const table: Texts["table"] = {
     label: "Werkzeuge",
     soundOn: "Ton ist an",
     soundOff: "Ton ist aus",
-    lookup: "Mögliche Züge",
   },
   lookup: {
     title: "Mögliche Züge",
@@ -281,14 +279,10 @@ export const table: Texts["table"] = {
   result: {
     shift: (shift) => `Shift ${shift}`,
     game: "Endstand",
-    place: "Platz",
-    name: "Name",
-    points: "Punkte",
     total: "Gesamt",
     curve: "Punkte der Partie nach jedem Shift, eine Linie je Sitzplatz",
     adjudicated: "Durch das Zuglimit beendet.",
     replay: "Replay ansehen",
-    lobby: "Zur Lobby",
     youWon: "Du hast gewonnen!",
     wins: (name) => `${name} hat gewonnen`,
   },
@@ -305,7 +299,6 @@ export const table: Texts["table"] = {
     unknownDecision: "Die Partie ist schon weiter. Lade die Seite neu, wenn sich nichts ändert.",
   },
   link: {
-    connecting: "Verbindung wird hergestellt…",
     lost: "Verbindung verloren. Wird wiederhergestellt…",
     superseded: "Dieser Platz wird in einem anderen Fenster oder auf einem anderen Gerät benutzt.",
     takeBack: "Hier spielen",

@@ -1,13 +1,12 @@
 // German texts of tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("de");
 
 export const tournaments: Texts["tournaments"] = {
-  title: "Turniere",
   none: "Es gibt noch kein Turnier. Erstelle eines, schick seine Adresse an Personen und Agenten und verfolge hier die Rangliste.",
   sections: { open: "Anmeldung offen", playing: "Laufend", over: "Beendet", closed: "Vorzeitig geschlossen" },
   states: {
@@ -42,7 +41,6 @@ export const tournaments: Texts["tournaments"] = {
   results: {
     title: "Ergebnisse",
     open: "Ergebnisse und Urkunden",
-    controls: "Ergebnisse",
     back: "Zurück zum Turnier",
     provisional: (date) => `Stand: ${date}; das Turnier ist noch nicht zu Ende.`,
     settings: "Wie gespielt wurde",
@@ -90,15 +88,9 @@ export const tournaments: Texts["tournaments"] = {
   standings: {
     title: "Rangliste",
     final: "Endstand",
-    place: "Platz",
-    name: "Name",
-    games: "Partien",
     score: "Mittlere Punktzahl",
     scoreHint: "Punkte im Mittel für den Platz in einer Partie. Sie bestimmen die Reihenfolge",
-    points: "Punkte",
-    places: "Platzierungen",
     placesWords: (places) => places.map((count, index) => `${count} × ${index + 1}. Platz`).join(", "),
-    rating: "Wertung",
     ratingHint: "Mittelwert und Unsicherheit, aus den gewerteten Partien dieses Turniers",
     round: "Letzte Runde",
     forfeited: (count) => plural(count, { one: "# kampflos verloren", other: "# kampflos verloren" }),
@@ -106,7 +98,6 @@ export const tournaments: Texts["tournaments"] = {
     filler: "füllt auf",
     withdrawn: "gegangen",
     former: (names) => `vorher: ${names}`,
-    away: "nicht verbunden",
     none: "Noch hat sich niemand angemeldet.",
     field: "Teilnehmer",
   },
@@ -114,15 +105,10 @@ export const tournaments: Texts["tournaments"] = {
     title: "Partien",
     bracket: "Turnierbaum",
     due: "noch nicht aufgerufen",
-    playing: "läuft",
     void: "ungültig",
-    watch: "Zuschauen",
-    replay: "Replay",
     of: (table, number) => `${table}, Partie ${number}`,
-    free: "steht noch nicht fest",
     from: (first) => `die ersten zwei von Tisch ${first}`,
     forfeited: "nicht erschienen",
-    left: "gegangen",
     advances: "kommt weiter",
     champion: "gewinnt das Turnier",
     none: "Die Tische werden beim Start des Turniers ausgelost.",
@@ -151,9 +137,7 @@ export const tournaments: Texts["tournaments"] = {
     text: "Du spielst im Browser. Bleib auf dieser Seite: Deine Partien beginnen hier automatisch.",
     code: "Beitrittscode des Turniers",
     codeMissing: "Gib den Code ein, den du von der Turnierleitung bekommen hast.",
-    name: "Dein Name",
     nameHint: "Alle sehen ihn. Er muss im Turnier einmalig sein.",
-    nameMissing: "Gib einen Namen ein.",
     submit: "Zum Turnier anmelden",
     notForPeople: "Personen können sich zu diesem Turnier nicht anmelden.",
   },
@@ -173,8 +157,6 @@ export const tournaments: Texts["tournaments"] = {
     left: "Du nimmst an diesem Turnier nicht mehr teil. Deine bisherigen Ergebnisse zählen.",
     replaced: "Jemand anders hat deinen Platz in diesem Turnier eingenommen.",
     over: "Das Turnier ist zu Ende. Danke fürs Mitspielen.",
-    connecting: "Verbindung wird hergestellt…",
-    lost: "Verbindung verloren. Wird wiederhergestellt…",
     superseded: "Du nimmst in einem anderen Fenster oder auf einem anderen Gerät teil.",
     takeBack: "Hier teilnehmen",
     begins: (place) => `Deine Partie beginnt: ${place}.`,

@@ -1,15 +1,13 @@
 // German texts of tutorial/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const tutorial: Texts["tutorial"] = {
-  title: "Spielen lernen",
   you: "Rosa",
   step: (step, all) => `${step} / ${all}`,
   next: "Weiter",
   watch: "Die anderen spielen…",
   play: "Jetzt eine Partie spielen",
-  toLobby: "Zur Lobby",
   notThis: "Eine gute Idee für später, aber in dieser Lektion geht es um etwas anderes.",
   lessons: {
     cards:

@@ -40,14 +40,12 @@ export const attend = {
   },
   violation: {
     label: "Not allowed",
-    of: (name: string, text: string) => (name ? `${name}: ${text}` : text),
     todo: "It does not count. Have the cards taken back, or correct what was misread.",
     takenBack: "Taken back",
     reenter: "Enter what really lies there",
     correct: "Correct an earlier report",
   },
   questions: {
-    title: "Questions",
     picture: "What the camera sees",
     withdraw: "No answer",
     /** The referee asks in English; see the Italian texts. */
@@ -77,7 +75,6 @@ export const attend = {
     },
     seat: "Who",
     face: "Face",
-    jokerAlone: "a joker alone",
     number: "How many",
     jokers: "Jokers with them",
     fewer: (what: string) => `Fewer: ${what}`,
@@ -90,7 +87,6 @@ export const attend = {
     passes: (name: string) => `${name} passes`,
     passWithdrawn: (name: string) => `${name} takes the pass back`,
     clearedText: "The pizza is done and the cards were taken off the board.",
-    cleared: "The board was cleared",
     declares: (name: string) => `${name} declares`,
     nobodyDeclares: "Nobody declares",
     giftUnseen: (name: string) => `${name} gave, cards not seen`,
@@ -152,24 +148,18 @@ export const attend = {
       }),
   },
   seats: {
-    title: "Seats",
-    atTable: "at the table",
     remote: "remote",
     handKnown: "hand known",
     handUnknown: "hand not known",
     passed: "passed",
     next: "to play",
   },
-  board: "On the board",
   link: {
     title: "On a tablet beside the table",
     text: "Anyone with this address can report about the table. Show it only to those who attend to it.",
-    address: "Address",
     qr: "QR code of the attendant’s view",
   },
   room: {
-    attend: "Attend to the table",
-    replay: "Replay",
     realCards: "real cards",
   },
 };

@@ -85,21 +85,28 @@ export const common = {
     "tomato",
     "mozzarella",
   ],
-  joker: "joker",
   cards: (count: number) => plural(count, { one: "# card", other: "# cards" }),
   points: (count: number) => plural(count, { one: "# point", other: "# points" }),
   place: ordinals("en", { one: "st", two: "nd", few: "rd", other: "th" }),
   seat: (seat: number) => `Seat ${seat + 1}`,
+  /** Headings of tables. */
+  columns: {
+    place: "Place",
+    name: "Name",
+    games: "Games",
+    points: "Points",
+    places: "Places",
+    rating: "Rating",
+  },
   close: "Close",
   cancel: "Cancel",
   changedMeanwhile: (before: string, now: string) =>
     `Nothing was done: ${now} has taken the place of ${before} in the meantime.`,
-  back: "Back",
   copy: "Copy",
   copied: "Copied",
   loading: "Loading…",
-  more: "More",
   showMore: "Show more",
+  toLobby: "Go to the lobby",
   pageNotLoaded: "This page could not be loaded. Check your connection and reload.",
   outdated: {
     text: "The server has been updated, and this page is the old version. Your seats and games stay as they are when you load the new one.",
@@ -110,5 +117,5 @@ export const common = {
     text: "An error of the page itself, not of your connection. Your seat and everything at the table are kept.",
     reload: "Reload",
   },
-  notFound: { title: "Page not found", text: "There is nothing at this address.", link: "Go to the lobby" },
+  notFound: { title: "Page not found", text: "There is nothing at this address." },
 };

@@ -6,11 +6,9 @@ import { time } from "./time";
 const plural = plurals("en");
 
 export const lobby = {
-  title: "Lobby",
   quick: {
     title: "Sit down and play",
     text: "You and three agents make pizzas. The first player without cards becomes the Chef.",
-    name: "Your name",
     guest: "Guest",
     roomOf: (name: string) => `${name}’s table`,
     start: "Play now",
@@ -24,7 +22,6 @@ export const lobby = {
     code: "Join code",
     codeMissing: "Enter the code you were given.",
     go: "Continue",
-    codeIs: "Join code",
     name: "Your name",
     nameHint: "Everyone at the table sees it.",
     nameMissing: "Enter a name.",
@@ -57,10 +54,8 @@ export const lobby = {
     free: "free",
     reservedFor: (kind: string) => `free for a ${kind}`.replace("a agent", "an agent"),
     you: "(you)",
-    away: "not connected",
   },
   tournaments: {
-    title: "Tournaments",
     open: "Open to join",
     playing: (over: number, games: number) => `Playing: ${over} of ${games} games`,
     none: "No tournament is open or in progress. Create one and invite people and agents.",
@@ -69,7 +64,6 @@ export const lobby = {
   invite: {
     title: "Invite others",
     text: "Send the address, read out the code, or let others scan the QR code with a phone.",
-    code: "Join code",
     link: "Address",
     agent: "For an agent, in a terminal",
     qr: "QR code of the address",
@@ -78,8 +72,6 @@ export const lobby = {
       " and open this page under this machine’s name or address, which then appears in the link and the QR code.",
   },
   door: {
-    sitDown: "Sit down",
-    toLobby: "Go to the lobby",
     close: "Close the room",
     closeSure: "Nobody will be able to play in it.",
     closePlaying: "The game ends for everyone, without a result.",
@@ -126,7 +118,6 @@ export const lobby = {
     closePlaying: "You created this room. If you end the game, it ends for everyone, without a result.",
     stay: "Stay",
     doIt: "Leave",
-    close: "Close the room",
     end: "End the game",
   },
   make: {
@@ -149,11 +140,7 @@ export const lobby = {
     choices: {
       atTableHuman: "A person at the table",
       atTableRobot: "A robot at the table",
-      remoteHuman: "Remote: free for a person",
-      remoteAnybody: "Remote: free for anyone",
-      remoteAgent: "Remote: free for an agent",
-      remoteRobot: "Remote: free for a robot",
-      remoteModel: "Remote: free for a language model",
+      remote: (free: string) => `Remote: ${free}`,
       human: "Free for a person",
       anybody: "Free for anyone",
       agent: "Free for an agent",

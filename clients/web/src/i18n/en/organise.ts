@@ -93,7 +93,6 @@ export const organise = {
     title: "You are the organiser",
     text: "Only this device can start, change and close it.",
     invite: "Invite participants",
-    agent: "For an agent, in a terminal",
     joined: (count: number) => plural(count, { one: "# has joined.", other: "# have joined." }),
     startsAt: (count: number) => `It starts automatically when ${count} have joined.`,
     start: "Start the tournament",
@@ -123,8 +122,6 @@ export const organise = {
     people: {
       title: "Change participants",
       change: "Change…",
-      withdrawn: "left",
-      former: (names: string) => `before: ${names}`,
       remove: "Remove…",
       removeDo: "Remove now",
       removeOpen: (name: string) => `Remove ${name}? The place becomes free. Anyone who has the code can join again.`,
@@ -136,7 +133,6 @@ export const organise = {
       newName: "Name of the other person",
       replaceDo: "Replace",
       linkFor: (name: string) => `Send this link only to ${name}; it contains the place.`,
-      link: "Link",
       linkSent: "I have passed it on",
     },
     games: {

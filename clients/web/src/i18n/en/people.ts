@@ -5,7 +5,6 @@ import { plurals } from "../plural";
 const plural = plurals("en");
 
 export const people = {
-  title: "Leaderboard",
   text: "Everyone who has played a rated game on this server. Players choose their own names; a key tells the same names apart.",
   ratedGames: (games: number) => plural(games, { one: "# rated game", other: "# rated games" }),
   kinds: { label: "Who", all: "Everyone", human: "People", robot: "Robots", agent: "Agents", model: "Language models" },
@@ -13,15 +12,7 @@ export const people = {
   none: "Nobody has played a rated game here yet.",
   noneOfThese: "Nobody matches these filters. Choose fewer games, or everyone.",
   toLobby: "Go to the lobby and play one",
-  columns: {
-    place: "Place",
-    name: "Name",
-    rating: "Rating",
-    ratingHint: "Estimated skill, ± its uncertainty (95%)",
-    games: "Games",
-    places: "Places",
-    range: (from: string, to: string) => `between ${from} and ${to}`,
-  },
+  ratingHint: "Estimated skill, ± its uncertainty (95%)",
   order: "Sorted by a cautious estimate: rating minus two standard deviations.",
   truncated: (count: number) => `Only the first ${count} are shown.`,
   which: {
@@ -54,7 +45,6 @@ export const people = {
     unrated: "No rated games yet.",
     notListed: (lines: number) => `Not among the first ${lines} of the leaderboard.`,
     rated: (place: number) => `Place ${place} on the leaderboard`,
-    rating: "Rating",
     ratingRange: (from: string, to: string) => `The skill lies between ${from} and ${to} with 95% confidence.`,
     games: "Finished games",
     wins: "Won",
@@ -68,7 +58,6 @@ export const people = {
     columns: { date: "When", place: "Place", points: "Points", game: "Game" },
     against: "Against",
     aborted: "aborted",
-    replay: "Replay",
     of: (room: string, date: string) => `${room}, ${date}`,
     toLeaderboard: "To the leaderboard",
   },

@@ -2,7 +2,6 @@
 
 export const replay = {
   title: "Replay",
-  controls: "Replay",
   first: "To the start",
   before: "One step back",
   play: "Play",
@@ -32,7 +31,6 @@ export const replay = {
     caption: (rollouts: number) =>
       `Mean points of the Shift and standard error, from ${rollouts.toLocaleString("en")} games played on by greedy agents`,
     action: "Action",
-    points: "Points",
     value: (points: number, error: number) => `${points.toFixed(2)} ± ${error.toFixed(2)}`,
     taken: "played",
     best: "best",

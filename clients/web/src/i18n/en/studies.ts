@@ -7,7 +7,6 @@ const plural = plurals("en");
 export const studies = {
   title: "Study",
   next: "Continue",
-  lost: "Connection lost. Reconnecting…",
   progress: (step: number, steps: number) => `Step ${step} of ${steps}`,
   elsewhere: {
     title: "You continue on another device or page",
@@ -23,8 +22,6 @@ export const studies = {
     there: "Open this link there. Nothing has begun or changed here.",
     wider:
       "Make the window wider, turn the device, or open this link on a larger one. Nothing has begun or changed here.",
-    link: "Link",
-    qr: "QR code of the link",
     retry: "Try again",
   },
   consent: {

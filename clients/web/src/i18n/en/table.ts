@@ -171,7 +171,6 @@ export const table = {
     suggested: (move: string) => `Suggested: ${move}`,
     points: (points: string, error: string) => `${points} ± ${error} points`,
     sending: "Sending…",
-    notYourTurn: "It is not your turn.",
     noPass: "Pick cards: you open and cannot pass.",
     mustPlay: "Nobody has played for a while: you must play.",
   },
@@ -247,7 +246,6 @@ export const table = {
     label: "Tools",
     soundOn: "Sound is on",
     soundOff: "Sound is off",
-    lookup: "Possible plays",
   },
   lookup: {
     title: "Possible plays",
@@ -276,14 +274,10 @@ export const table = {
   result: {
     shift: (shift: number) => `Shift ${shift}`,
     game: "Final standings",
-    place: "Place",
-    name: "Name",
-    points: "Points",
     total: "Total",
     curve: "Points of the game after each Shift, a line for each seat",
     adjudicated: "Ended by the turn limit.",
     replay: "Watch the replay",
-    lobby: "Go to the lobby",
     youWon: "You won!",
     wins: (name: string) => `${name} won`,
   },
@@ -300,7 +294,6 @@ export const table = {
     unknownDecision: "The game has moved on. Reload the page if nothing changes.",
   },
   link: {
-    connecting: "Connecting…",
     lost: "Connection lost. Reconnecting…",
     superseded: "This seat is in use in another window or on another device.",
     takeBack: "Play here",

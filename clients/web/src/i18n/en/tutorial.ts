@@ -1,13 +1,11 @@
 // English texts of tutorial/.
 
 export const tutorial = {
-  title: "Learn to play",
   you: "Rosa",
   step: (step: number, all: number) => `${step} / ${all}`,
   next: "Continue",
   watch: "The others play…",
   play: "Play a game now",
-  toLobby: "Go to the lobby",
   notThis: "A good idea for later, but this lesson asks for something else.",
   lessons: {
     cards:

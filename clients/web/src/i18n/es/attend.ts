@@ -1,7 +1,7 @@
 // Spanish texts of attend/: the attendant of a table with real cards.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 
@@ -44,14 +44,12 @@ export const attend: Texts["attend"] = {
   },
   violation: {
     label: "No permitido",
-    of: (name, text) => (name ? `${name}: ${text}` : text),
     todo: "No cuenta. Pide que se retiren las cartas, o corrige lo que se leyó mal.",
     takenBack: "Cartas retiradas",
     reenter: "Escribir lo que hay de verdad",
     correct: "Corregir una anotación anterior",
   },
   questions: {
-    title: "Preguntas",
     picture: "Lo que ve la cámara",
     withdraw: "Sin respuesta",
     words: (text) => {
@@ -90,7 +88,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Quién",
     face: "Valor",
-    jokerAlone: "un comodín solo",
     number: "Cuántas",
     jokers: "Comodines con ellas",
     fewer: (what) => `Menos: ${what}`,
@@ -103,7 +100,6 @@ export const attend: Texts["attend"] = {
     passes: (name) => `${name} pasa`,
     passWithdrawn: (name) => `${name} retira el pase`,
     clearedText: "La pizza está lista y las cartas se han quitado del tablero.",
-    cleared: "El tablero se ha vaciado",
     declares: (name) => `${name} declara`,
     nobodyDeclares: "Nadie declara",
     giftUnseen: (name) => `${name} ha dado, cartas no vistas`,
@@ -166,24 +162,18 @@ export const attend: Texts["attend"] = {
       }),
   },
   seats: {
-    title: "Asientos",
-    atTable: "en la mesa",
     remote: "a distancia",
     handKnown: "mano conocida",
     handUnknown: "mano desconocida",
     passed: "ha pasado",
     next: "juega",
   },
-  board: "En el tablero",
   link: {
     title: "En una tableta junto a la mesa",
     text: "Quien tenga esta dirección puede anotar lo que pasa en la mesa. Enséñala solo a quienes la atienden.",
-    address: "Dirección",
     qr: "Código QR de la vista para atender la mesa",
   },
   room: {
-    attend: "Atender la mesa",
-    replay: "Repetición",
     realCards: "cartas reales",
   },
 };

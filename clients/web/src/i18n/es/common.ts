@@ -3,8 +3,8 @@
 // "mano", play "jugar", "jugada", pass "pasar", declare "declarar", exchange "intercambio", game
 // "partida".
 
-import type { Texts } from "../en";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 
@@ -94,20 +94,27 @@ export const common: Texts["common"] = {
     "tomate",
     "mozzarella",
   ],
-  joker: "comodín",
   cards: (count) => plural(count, { one: "# carta", other: "# cartas" }),
   points: (count) => plural(count, { one: "# punto", other: "# puntos" }),
   place: ordinals("es", { other: ".º" }),
   seat: (seat) => `Asiento ${seat + 1}`,
+  /** Headings of tables. */
+  columns: {
+    place: "Puesto",
+    name: "Nombre",
+    games: "Partidas",
+    points: "Puntos",
+    places: "Puestos",
+    rating: "Valoración",
+  },
   close: "Cerrar",
   cancel: "Cancelar",
   changedMeanwhile: (before, now) => `No se ha hecho nada: mientras tanto, ${now} ha ocupado el lugar de ${before}.`,
-  back: "Atrás",
   copy: "Copiar",
   copied: "Copiado",
   loading: "Cargando…",
-  more: "Más",
   showMore: "Mostrar más",
+  toLobby: "Ir al vestíbulo",
   pageNotLoaded: "No se ha podido cargar esta página. Comprueba tu conexión y vuelve a cargarla.",
   outdated: {
     text: "El servidor se ha actualizado y esta página es la versión anterior. Tus sitios y partidas se conservan al cargar la nueva.",
@@ -121,6 +128,5 @@ export const common: Texts["common"] = {
   notFound: {
     title: "Página no encontrada",
     text: "En esta dirección no hay nada.",
-    link: "Ir al vestíbulo",
   },
 };

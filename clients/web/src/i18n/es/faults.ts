@@ -1,6 +1,6 @@
 // What can go wrong in a call, in Spanish.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 export const faults: Texts["faults"] = {

@@ -1,17 +1,15 @@
 // Spanish texts of lobby/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("es");
 
 export const lobby: Texts["lobby"] = {
-  title: "Vestíbulo",
   quick: {
     title: "Siéntate y juega",
     text: "Prepara pizzas con tres agentes. Quien se quede sin cartas antes que los demás será el Chef.",
-    name: "Tu nombre",
     guest: "Invitado",
     roomOf: (name) => `Mesa de ${name}`,
     start: "Jugar ya",
@@ -25,7 +23,6 @@ export const lobby: Texts["lobby"] = {
     code: "Código de acceso",
     codeMissing: "Escribe el código que has recibido.",
     go: "Continuar",
-    codeIs: "Código de acceso",
     name: "Tu nombre",
     nameHint: "Lo ven todos en la mesa.",
     nameMissing: "Escribe un nombre.",
@@ -58,10 +55,8 @@ export const lobby: Texts["lobby"] = {
     free: "libre",
     reservedFor: (kind) => `libre para: ${kind}`,
     you: "(tú)",
-    away: "sin conexión",
   },
   tournaments: {
-    title: "Torneos",
     open: "Inscripción abierta",
     playing: (over, games) => `En curso: ${over} de ${games} partidas`,
     none: "No hay ningún torneo abierto ni en curso. Crea uno e invita a personas y agentes.",
@@ -70,7 +65,6 @@ export const lobby: Texts["lobby"] = {
   invite: {
     title: "Invitar a otros",
     text: "Envía la dirección, lee el código en voz alta o deja que escaneen el código QR con un teléfono.",
-    code: "Código de acceso",
     link: "Dirección",
     agent: "Para un agente, en una terminal",
     qr: "Código QR de la dirección",
@@ -79,8 +73,6 @@ export const lobby: Texts["lobby"] = {
       " y abre esta página con el nombre o la dirección de este equipo, que aparece entonces en el enlace y en el código QR.",
   },
   door: {
-    sitDown: "Sentarse",
-    toLobby: "Ir al vestíbulo",
     close: "Cerrar la sala",
     closeSure: "Nadie podrá jugar en ella.",
     closePlaying: "La partida termina para todos, sin resultado.",
@@ -127,7 +119,6 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "Has creado esta sala. Si terminas la partida, termina para todos, sin resultado.",
     stay: "Quedarse",
     doIt: "Irse",
-    close: "Cerrar la sala",
     end: "Terminar la partida",
   },
   make: {
@@ -150,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Una persona en la mesa",
       atTableRobot: "Un robot en la mesa",
-      remoteHuman: "A distancia: libre para una persona",
-      remoteAnybody: "A distancia: libre para cualquiera",
-      remoteAgent: "A distancia: libre para un agente",
-      remoteRobot: "A distancia: libre para un robot",
-      remoteModel: "A distancia: libre para un modelo de lenguaje",
+      remote: (free) => `A distancia: ${free}`,
       human: "Libre para una persona",
       anybody: "Libre para cualquiera",
       agent: "Libre para un agente",

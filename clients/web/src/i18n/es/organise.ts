@@ -1,7 +1,7 @@
 // Spanish texts of creating and running a tournament, in tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 
@@ -95,7 +95,6 @@ export const organise: Texts["organise"] = {
     title: "Organizas este torneo",
     text: "Solo este dispositivo puede iniciarlo, cambiarlo y cerrarlo.",
     invite: "Invitar a participantes",
-    agent: "Para un agente, en una terminal",
     joined: (count) => plural(count, { one: "# inscripción.", other: "# inscripciones." }),
     startsAt: (count) => `Empieza automáticamente con ${count} inscripciones.`,
     start: "Iniciar el torneo",
@@ -125,8 +124,6 @@ export const organise: Texts["organise"] = {
     people: {
       title: "Cambiar participantes",
       change: "Cambiar…",
-      withdrawn: "se ha ido",
-      former: (names) => `antes: ${names}`,
       remove: "Quitar…",
       removeDo: "Quitar ahora",
       removeOpen: (name) =>
@@ -139,7 +136,6 @@ export const organise: Texts["organise"] = {
       newName: "Nombre de la otra persona",
       replaceDo: "Sustituir",
       linkFor: (name) => `Envía este enlace solo a ${name}; contiene la plaza.`,
-      link: "Enlace",
       linkSent: "Ya lo he entregado",
     },
     games: {

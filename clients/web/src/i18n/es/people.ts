@@ -1,12 +1,11 @@
 // Spanish texts of people/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 
 export const people: Texts["people"] = {
-  title: "Clasificación",
   text: "Quienes han jugado una partida puntuable en este servidor. Cada cual elige su nombre; una clave distingue los que son iguales.",
   ratedGames: (games) => plural(games, { one: "# partida puntuable", other: "# partidas puntuables" }),
   kinds: {
@@ -24,15 +23,7 @@ export const people: Texts["people"] = {
   none: "Aquí todavía nadie ha jugado una partida puntuable.",
   noneOfThese: "Nadie cumple estos filtros. Elige menos partidas, o a todos.",
   toLobby: "Ve al vestíbulo y juega una",
-  columns: {
-    place: "Puesto",
-    name: "Nombre",
-    rating: "Valoración",
-    ratingHint: "Habilidad estimada, ± su incertidumbre (95 %)",
-    games: "Partidas",
-    places: "Puestos",
-    range: (from, to) => `entre ${from} y ${to}`,
-  },
+  ratingHint: "Habilidad estimada, ± su incertidumbre (95 %)",
   order: "Orden según una estimación prudente: valoración menos dos desviaciones estándar.",
   truncated: (count) => `Solo se muestran los primeros ${count}.`,
   which: {
@@ -65,7 +56,6 @@ export const people: Texts["people"] = {
     unrated: "Todavía no hay partidas puntuables.",
     notListed: (lines) => `No está entre los primeros ${lines} de la clasificación.`,
     rated: (place) => `Puesto ${place} de la clasificación`,
-    rating: "Valoración",
     ratingRange: (from, to) => `La habilidad está entre ${from} y ${to} con una confianza del 95 %.`,
     games: "Partidas terminadas",
     wins: "Ganadas",
@@ -80,7 +70,6 @@ export const people: Texts["people"] = {
     columns: { date: "Cuándo", place: "Puesto", points: "Puntos", game: "Partida" },
     against: "Contra",
     aborted: "interrumpida",
-    replay: "Repetición",
     of: (room, date) => `${room}, ${date}`,
     toLeaderboard: "A la clasificación",
   },

@@ -1,10 +1,9 @@
 // Spanish texts of replay/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const replay: Texts["replay"] = {
   title: "Repetición",
-  controls: "Repetición",
   first: "Al principio",
   before: "Un paso atrás",
   play: "Reproducir",
@@ -34,7 +33,6 @@ export const replay: Texts["replay"] = {
     caption: (rollouts) =>
       `Puntos medios del Shift y error estándar, de ${rollouts.toLocaleString("es")} partidas continuadas por agentes greedy`,
     action: "Acción",
-    points: "Puntos",
     value: (points, error) => `${points.toFixed(2)} ± ${error.toFixed(2)}`.replaceAll(".", ","),
     taken: "jugada",
     best: "mejor",

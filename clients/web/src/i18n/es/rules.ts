@@ -1,6 +1,6 @@
 // Spanish texts of the rules in short.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const rules: Texts["rules"] = {
   title: "Las reglas en breve",

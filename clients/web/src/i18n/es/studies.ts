@@ -1,14 +1,13 @@
 // Spanish texts of studies, in studies/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 
 export const studies: Texts["studies"] = {
   title: "Estudio",
   next: "Continuar",
-  lost: "Conexión perdida. Reconectando…",
   progress: (step, steps) => `Paso ${step} de ${steps}`,
   elsewhere: {
     title: "Usted continúa en otro dispositivo o en otra página",
@@ -23,8 +22,6 @@ export const studies: Texts["studies"] = {
     there: "Abra allí este enlace. Aquí no ha empezado ni cambiado nada.",
     wider:
       "Ensanche la ventana, gire el dispositivo o abra este enlace en uno más grande. Aquí no ha empezado ni cambiado nada.",
-    link: "Enlace",
-    qr: "Código QR del enlace",
     retry: "Intentarlo de nuevo",
   },
   consent: {

@@ -2,8 +2,8 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import type { Texts } from "../en";
 import { numerals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("es");
 const number = numerals("uno dos tres cuatro cinco seis siete ocho nueve diez once doce trece catorce quince");
@@ -176,7 +176,6 @@ export const table: Texts["table"] = {
     suggested: (move) => `Jugada sugerida: ${move}`,
     points: (points, error) => `${points} ± ${error} puntos`,
     sending: "Enviando…",
-    notYourTurn: "No te toca.",
     noPass: "Elige cartas: quien abre no puede pasar.",
     mustPlay: "Hace tiempo que nadie juega: tienes que jugar.",
   },
@@ -252,7 +251,6 @@ export const table: Texts["table"] = {
     label: "Herramientas",
     soundOn: "Sonido activado",
     soundOff: "Sonido desactivado",
-    lookup: "Jugadas posibles",
   },
   lookup: {
     title: "Jugadas posibles",
@@ -281,14 +279,10 @@ export const table: Texts["table"] = {
   result: {
     shift: (shift) => `Shift ${shift}`,
     game: "Clasificación final",
-    place: "Puesto",
-    name: "Nombre",
-    points: "Puntos",
     total: "Total",
     curve: "Puntos de la partida tras cada Shift, una línea por asiento",
     adjudicated: "Terminado por el límite de turnos.",
     replay: "Ver la repetición",
-    lobby: "Ir al vestíbulo",
     youWon: "¡Has ganado!",
     wins: (name) => `Ha ganado ${name}`,
   },
@@ -305,7 +299,6 @@ export const table: Texts["table"] = {
     unknownDecision: "La partida ha avanzado. Si no cambia nada, vuelve a cargar la página.",
   },
   link: {
-    connecting: "Conectando…",
     lost: "Conexión perdida. Reconectando…",
     superseded: "Este asiento se está usando en otra ventana o en otro dispositivo.",
     takeBack: "Jugar aquí",

@@ -1,13 +1,12 @@
 // Spanish texts of tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("es");
 
 export const tournaments: Texts["tournaments"] = {
-  title: "Torneos",
   none: "Todavía no hay ningún torneo. Crea uno, envía su dirección a personas y agentes y sigue aquí la clasificación.",
   sections: {
     open: "Inscripción abierta",
@@ -47,7 +46,6 @@ export const tournaments: Texts["tournaments"] = {
   results: {
     title: "Resultados",
     open: "Resultados y diplomas",
-    controls: "Resultados",
     back: "Volver al torneo",
     provisional: (date) => `Situación a ${date}; el torneo no ha terminado.`,
     settings: "Cómo se jugó",
@@ -94,15 +92,9 @@ export const tournaments: Texts["tournaments"] = {
   standings: {
     title: "Clasificación",
     final: "Clasificación final",
-    place: "Puesto",
-    name: "Nombre",
-    games: "Partidas",
     score: "Puntuación media",
     scoreHint: "Puntos de media por el puesto en una partida. Deciden el orden",
-    points: "Puntos",
-    places: "Puestos",
     placesWords: (places) => places.map((count, index) => `${count} × puesto ${index + 1}`).join(", "),
-    rating: "Valoración",
     ratingHint: "Media e incertidumbre, de las partidas puntuables de este torneo",
     round: "Última ronda",
     forfeited: (count) => plural(count, { one: "# incomparecencia", other: "# incomparecencias" }),
@@ -110,7 +102,6 @@ export const tournaments: Texts["tournaments"] = {
     filler: "relleno",
     withdrawn: "se ha ido",
     former: (names) => `antes: ${names}`,
-    away: "sin conexión",
     none: "Todavía no se ha inscrito nadie.",
     field: "Participantes",
   },
@@ -118,15 +109,10 @@ export const tournaments: Texts["tournaments"] = {
     title: "Partidas",
     bracket: "Cuadro",
     due: "aún no llamada",
-    playing: "en curso",
     void: "anulada",
-    watch: "Ver",
-    replay: "Repetición",
     of: (table, number) => `${table}, partida ${number}`,
-    free: "por decidir",
     from: (first) => `los dos primeros de la mesa ${first}`,
     forfeited: "no se presentó",
-    left: "se ha ido",
     advances: "pasa de ronda",
     champion: "gana el torneo",
     none: "Las mesas se sortean cuando empieza el torneo.",
@@ -155,9 +141,7 @@ export const tournaments: Texts["tournaments"] = {
     text: "Juegas en el navegador. Quédate en esta página: tus partidas empiezan aquí automáticamente.",
     code: "Código de acceso del torneo",
     codeMissing: "Escribe el código que te dio la organización.",
-    name: "Tu nombre",
     nameHint: "Lo ven todos. Debe ser único en el torneo.",
-    nameMissing: "Escribe un nombre.",
     submit: "Inscribirse en el torneo",
     notForPeople: "Las personas no pueden inscribirse en este torneo.",
   },
@@ -176,8 +160,6 @@ export const tournaments: Texts["tournaments"] = {
     left: "Ya no participas en este torneo. Tus resultados hasta ahora cuentan.",
     replaced: "Otra persona ha ocupado tu plaza en este torneo.",
     over: "El torneo ha terminado. Gracias por jugar.",
-    connecting: "Conectando…",
-    lost: "Conexión perdida. Reconectando…",
     superseded: "Participas en otra ventana o en otro dispositivo.",
     takeBack: "Participar aquí",
     begins: (place) => `Tu partida empieza: ${place}.`,

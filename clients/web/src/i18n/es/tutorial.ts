@@ -1,15 +1,13 @@
 // Spanish texts of tutorial/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const tutorial: Texts["tutorial"] = {
-  title: "Aprende a jugar",
   you: "Rosa",
   step: (step, all) => `${step} / ${all}`,
   next: "Continuar",
   watch: "Juegan los demás…",
   play: "Jugar ya una partida",
-  toLobby: "Ir al vestíbulo",
   notThis: "Buena idea para después, pero esta lección pide otra cosa.",
   lessons: {
     cards:

@@ -1,7 +1,7 @@
 // Italian texts of attend/: chi assiste a un tavolo con carte vere.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 
@@ -45,14 +45,12 @@ export const attend: Texts["attend"] = {
   },
   violation: {
     label: "Non permesso",
-    of: (name, text) => (name ? `${name}: ${text}` : text),
     todo: "Non conta. Fai riprendere le carte, o correggi ciò che è stato letto male.",
     takenBack: "Carte riprese",
     reenter: "Inserisci che cosa c’è davvero",
     correct: "Correggi una segnalazione precedente",
   },
   questions: {
-    title: "Domande",
     picture: "Che cosa vede la telecamera",
     withdraw: "Nessuna risposta",
     words: (text) => {
@@ -91,7 +89,6 @@ export const attend: Texts["attend"] = {
     },
     seat: "Chi",
     face: "Valore",
-    jokerAlone: "un jolly da solo",
     number: "Quante",
     jokers: "Jolly insieme",
     fewer: (what) => `Meno: ${what}`,
@@ -104,7 +101,6 @@ export const attend: Texts["attend"] = {
     passes: (name) => `${name} passa`,
     passWithdrawn: (name) => `${name} ritira il passo`,
     clearedText: "La pizza è finita e le carte sono state tolte dal piatto.",
-    cleared: "Il piatto è stato svuotato",
     declares: (name) => `${name} dichiara`,
     nobodyDeclares: "Nessuno dichiara",
     giftUnseen: (name) => `${name} ha dato, carte non viste`,
@@ -166,24 +162,18 @@ export const attend: Texts["attend"] = {
       }),
   },
   seats: {
-    title: "Posti",
-    atTable: "al tavolo",
     remote: "a distanza",
     handKnown: "mano nota",
     handUnknown: "mano non nota",
     passed: "ha passato",
     next: "gioca",
   },
-  board: "Sul piatto",
   link: {
     title: "Su un tablet accanto al tavolo",
     text: "Chi ha questo indirizzo può fare segnalazioni sul tavolo. Mostralo solo a chi assiste.",
-    address: "Indirizzo",
     qr: "Codice QR della vista di chi assiste",
   },
   room: {
-    attend: "Assisti al tavolo",
-    replay: "Replay",
     realCards: "carte vere",
   },
 };

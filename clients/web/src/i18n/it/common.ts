@@ -1,8 +1,8 @@
 // Italian texts that several parts of the page use: the frame, kinds of participants, words of the
 // game.
 
-import type { Texts } from "../en";
 import { ordinals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 
@@ -91,20 +91,27 @@ export const common: Texts["common"] = {
     "pomodoro",
     "mozzarella",
   ],
-  joker: "jolly",
   cards: (count) => plural(count, { one: "# carta", other: "# carte" }),
   points: (count) => plural(count, { one: "# punto", other: "# punti" }),
   place: ordinals("it", { other: "º" }),
   seat: (seat) => `Posto ${seat + 1}`,
+  /** Headings of tables. */
+  columns: {
+    place: "Posizione",
+    name: "Nome",
+    games: "Partite",
+    points: "Punti",
+    places: "Piazzamenti",
+    rating: "Valutazione",
+  },
   close: "Chiudi",
   cancel: "Annulla",
   changedMeanwhile: (before, now) => `Non è stato fatto nulla: nel frattempo ${now} ha preso il posto di ${before}.`,
-  back: "Indietro",
   copy: "Copia",
   copied: "Copiato",
   loading: "Caricamento…",
-  more: "Altri",
   showMore: "Mostra altro",
+  toLobby: "Vai alla sala",
   pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
   outdated: {
     text: "Il server è stato aggiornato e questa pagina è la versione precedente. I tuoi posti e le tue partite restano quando carichi quella nuova.",
@@ -115,5 +122,5 @@ export const common: Texts["common"] = {
     text: "È un errore della pagina stessa, non della connessione. Il tuo posto e tutto ciò che è sul tavolo restano.",
     reload: "Ricarica",
   },
-  notFound: { title: "Questa pagina non esiste", text: "A questo indirizzo non c’è nulla.", link: "Vai alla sala" },
+  notFound: { title: "Questa pagina non esiste", text: "A questo indirizzo non c’è nulla." },
 };

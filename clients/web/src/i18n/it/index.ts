@@ -1,32 +1,15 @@
 // All Italian texts.
 
-import type { Texts } from "../en";
-import { attend } from "./attend";
-import { common } from "./common";
-import { faults } from "./faults";
-import { lobby } from "./lobby";
-import { organise } from "./organise";
-import { people } from "./people";
-import { replay } from "./replay";
-import { rules } from "./rules";
-import { studies } from "./studies";
-import { table } from "./table";
-import { tournaments } from "./tournaments";
-import { tutorial } from "./tutorial";
-import { wizard } from "./wizard";
-
-export const it: Texts = {
-  attend,
-  common,
-  faults,
-  lobby,
-  organise,
-  people,
-  replay,
-  rules,
-  studies,
-  table,
-  tournaments,
-  tutorial,
-  wizard,
-};
+export * from "./attend";
+export * from "./common";
+export * from "./faults";
+export * from "./lobby";
+export * from "./organise";
+export * from "./people";
+export * from "./replay";
+export * from "./rules";
+export * from "./studies";
+export * from "./table";
+export * from "./tournaments";
+export * from "./tutorial";
+export * from "./wizard";

@@ -1,17 +1,15 @@
 // Italian texts of lobby/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("it");
 
 export const lobby: Texts["lobby"] = {
-  title: "Sala",
   quick: {
     title: "Siediti e gioca",
     text: "Tu e tre agenti preparate pizze. Chi resta per primo senza carte diventa lo Chef.",
-    name: "Il tuo nome",
     guest: "Ospite",
     roomOf: (name) => `Il tavolo di ${name}`,
     start: "Gioca subito",
@@ -25,7 +23,6 @@ export const lobby: Texts["lobby"] = {
     code: "Codice d’ingresso",
     codeMissing: "Inserisci il codice che hai ricevuto.",
     go: "Avanti",
-    codeIs: "Codice d’ingresso",
     name: "Il tuo nome",
     nameHint: "Lo vedono tutti al tavolo.",
     nameMissing: "Inserisci un nome.",
@@ -58,10 +55,8 @@ export const lobby: Texts["lobby"] = {
     free: "libero",
     reservedFor: (kind) => `riservato: ${kind}`,
     you: "(tu)",
-    away: "non connesso",
   },
   tournaments: {
-    title: "Tornei",
     open: "Iscrizioni aperte",
     playing: (over, games) => `In corso: ${over} partite su ${games}`,
     none: "Nessun torneo è aperto o in corso. Creane uno e invita persone e agenti.",
@@ -70,7 +65,6 @@ export const lobby: Texts["lobby"] = {
   invite: {
     title: "Invita gli altri",
     text: "Manda l’indirizzo, detta il codice o fai inquadrare il codice QR con un telefono.",
-    code: "Codice d’ingresso",
     link: "Indirizzo",
     agent: "Per un agente, in un terminale",
     qr: "Codice QR dell’indirizzo",
@@ -79,8 +73,6 @@ export const lobby: Texts["lobby"] = {
       " e apri questa pagina con il nome o l’indirizzo di questo computer, che così compare nel link e nel codice QR.",
   },
   door: {
-    sitDown: "Siediti",
-    toLobby: "Vai alla sala",
     close: "Chiudi la stanza",
     closeSure: "Nessuno potrà giocarci.",
     closePlaying: "La partita finisce per tutti, senza risultato.",
@@ -127,7 +119,6 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "Hai creato tu questa stanza. Se termini la partita, finisce per tutti, senza risultato.",
     stay: "Resta",
     doIt: "Lascia",
-    close: "Chiudi la stanza",
     end: "Termina la partita",
   },
   make: {
@@ -150,11 +141,7 @@ export const lobby: Texts["lobby"] = {
     choices: {
       atTableHuman: "Una persona al tavolo",
       atTableRobot: "Un robot al tavolo",
-      remoteHuman: "A distanza: libero per una persona",
-      remoteAnybody: "A distanza: libero per chiunque",
-      remoteAgent: "A distanza: libero per un agente",
-      remoteRobot: "A distanza: libero per un robot",
-      remoteModel: "A distanza: libero per un modello linguistico",
+      remote: (free) => `A distanza: ${free}`,
       human: "Libero per una persona",
       anybody: "Libero per chiunque",
       agent: "Libero per un agente",

@@ -1,7 +1,7 @@
 // Italian texts of creating and running a tournament, in tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 
@@ -96,7 +96,6 @@ export const organise: Texts["organise"] = {
     title: "Organizzi tu questo torneo",
     text: "Solo questo dispositivo può avviarlo, modificarlo e chiuderlo.",
     invite: "Invita i partecipanti",
-    agent: "Per un agente, in un terminale",
     joined: (count) => plural(count, { one: "# iscritto.", other: "# iscritti." }),
     startsAt: (count) => `Inizia automaticamente con ${count} iscritti.`,
     start: "Avvia il torneo",
@@ -126,8 +125,6 @@ export const organise: Texts["organise"] = {
     people: {
       title: "Modifica i partecipanti",
       change: "Modifica…",
-      withdrawn: "ha lasciato",
-      former: (names) => `prima: ${names}`,
       remove: "Escludi…",
       removeDo: "Escludi ora",
       removeOpen: (name) => `Escludere ${name}? Il posto torna libero. Chi ha il codice può iscriversi di nuovo.`,
@@ -139,7 +136,6 @@ export const organise: Texts["organise"] = {
       newName: "Nome dell’altra persona",
       replaceDo: "Sostituisci",
       linkFor: (name) => `Manda questo link solo a ${name}: contiene il posto.`,
-      link: "Link",
       linkSent: "L’ho consegnato",
     },
     games: {

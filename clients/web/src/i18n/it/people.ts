@@ -1,12 +1,11 @@
 // Italian texts of people/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 
 export const people: Texts["people"] = {
-  title: "Classifica",
   text: "Chiunque abbia giocato una partita valutata su questo server. Ognuno sceglie il proprio nome; una chiave distingue i nomi uguali.",
   ratedGames: (games) => plural(games, { one: "# partita valutata", other: "# partite valutate" }),
   kinds: {
@@ -21,15 +20,7 @@ export const people: Texts["people"] = {
   none: "Qui nessuno ha ancora giocato una partita valutata.",
   noneOfThese: "Nessuno corrisponde a questi filtri. Scegli meno partite, o tutti.",
   toLobby: "Vai alla sala e giocane una",
-  columns: {
-    place: "Posizione",
-    name: "Nome",
-    rating: "Valutazione",
-    ratingHint: "Abilità stimata, ± la sua incertezza (95%)",
-    games: "Partite",
-    places: "Piazzamenti",
-    range: (from, to) => `tra ${from} e ${to}`,
-  },
+  ratingHint: "Abilità stimata, ± la sua incertezza (95%)",
   order: "Ordine secondo una stima prudente: valutazione meno due deviazioni standard.",
   truncated: (count) => `Si vedono solo i primi ${count}.`,
   which: {
@@ -62,7 +53,6 @@ export const people: Texts["people"] = {
     unrated: "Ancora nessuna partita valutata.",
     notListed: (lines) => `Non è tra i primi ${lines} della classifica.`,
     rated: (place) => `${place}º posto in classifica`,
-    rating: "Valutazione",
     ratingRange: (from, to) => `L’abilità è compresa tra ${from} e ${to} con una confidenza del 95%.`,
     games: "Partite concluse",
     wins: "Vinte",
@@ -77,7 +67,6 @@ export const people: Texts["people"] = {
     columns: { date: "Quando", place: "Posizione", points: "Punti", game: "Partita" },
     against: "Contro",
     aborted: "interrotta",
-    replay: "Rivedi",
     of: (room, date) => `${room}, ${date}`,
     toLeaderboard: "Vai alla classifica",
   },

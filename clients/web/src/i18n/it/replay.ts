@@ -1,10 +1,9 @@
 // Italian texts of replay/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const replay: Texts["replay"] = {
   title: "Replay",
-  controls: "Replay",
   first: "All’inizio",
   before: "Un passo indietro",
   play: "Avvia",
@@ -34,7 +33,6 @@ export const replay: Texts["replay"] = {
     caption: (rollouts) =>
       `Punti medi dello Shift con errore standard, da ${rollouts.toLocaleString("it")} partite continuate da agenti greedy`,
     action: "Azione",
-    points: "Punti",
     value: (points, error) => `${points.toFixed(2)} ± ${error.toFixed(2)}`.replaceAll(".", ","),
     taken: "giocata",
     best: "migliore",

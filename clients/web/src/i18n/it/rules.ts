@@ -1,6 +1,6 @@
 // Italian texts of the rules in short.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const rules: Texts["rules"] = {
   title: "Le regole in breve",

@@ -1,14 +1,13 @@
 // Italian texts of studies, in studies/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 
 export const studies: Texts["studies"] = {
   title: "Studio",
   next: "Continua",
-  lost: "Connessione persa. Riconnessione…",
   progress: (step, steps) => `Passo ${step} di ${steps}`,
   elsewhere: {
     title: "Lei continua su un altro dispositivo o un’altra pagina",
@@ -23,8 +22,6 @@ export const studies: Texts["studies"] = {
     there: "Apra lì questo link. Qui non è cominciato né cambiato nulla.",
     wider:
       "Allarghi la finestra, giri il dispositivo o apra questo link su uno più grande. Qui non è cominciato né cambiato nulla.",
-    link: "Link",
-    qr: "Codice QR del link",
     retry: "Riprovare",
   },
   consent: {

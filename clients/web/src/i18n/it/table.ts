@@ -2,8 +2,8 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import type { Texts } from "../en";
 import { numerals, plurals } from "../plural";
+import type { Texts } from "../texts";
 
 const plural = plurals("it");
 const number = numerals(
@@ -180,7 +180,6 @@ export const table: Texts["table"] = {
     suggested: (move) => `Mossa suggerita: ${move}`,
     points: (points, error) => `${points} ± ${error} punti`,
     sending: "Invio…",
-    notYourTurn: "Non tocca a te.",
     noPass: "Scegli le carte: apri tu e non puoi passare.",
     mustPlay: "Nessuno gioca da tempo: ora devi giocare.",
   },
@@ -256,7 +255,6 @@ export const table: Texts["table"] = {
     label: "Strumenti",
     soundOn: "Suoni accesi",
     soundOff: "Suoni spenti",
-    lookup: "Giocate possibili",
   },
   lookup: {
     title: "Giocate possibili",
@@ -285,14 +283,10 @@ export const table: Texts["table"] = {
   result: {
     shift: (shift) => `Shift ${shift}`,
     game: "Classifica finale",
-    place: "Posto",
-    name: "Nome",
-    points: "Punti",
     total: "Totale",
     curve: "Punti della partita dopo ogni Shift, una linea per posto",
     adjudicated: "Terminato per il limite di turni.",
     replay: "Guarda il replay",
-    lobby: "Vai alla sala",
     youWon: "Hai vinto!",
     wins: (name) => `Ha vinto ${name}`,
   },
@@ -309,7 +303,6 @@ export const table: Texts["table"] = {
     unknownDecision: "La partita è andata avanti. Se non cambia nulla, ricarica la pagina.",
   },
   link: {
-    connecting: "Connessione…",
     lost: "Connessione persa. Riconnessione…",
     superseded: "Questo posto è in uso in un’altra finestra o su un altro dispositivo.",
     takeBack: "Gioca qui",

@@ -1,13 +1,12 @@
 // Italian texts of tournaments/.
 
-import type { Texts } from "../en";
 import { plurals } from "../plural";
+import type { Texts } from "../texts";
 import { time } from "./time";
 
 const plural = plurals("it");
 
 export const tournaments: Texts["tournaments"] = {
-  title: "Tornei",
   none: "Non c’è ancora nessun torneo. Creane uno, manda l’indirizzo a persone e agenti e segui qui la classifica.",
   sections: { open: "Iscrizioni aperte", playing: "In corso", over: "Conclusi", closed: "Chiusi in anticipo" },
   states: {
@@ -42,7 +41,6 @@ export const tournaments: Texts["tournaments"] = {
   results: {
     title: "Risultati",
     open: "Risultati e attestati",
-    controls: "Risultati",
     back: "Torna al torneo",
     provisional: (date) => `Situazione al ${date}; il torneo non è finito.`,
     settings: "Come si è giocato",
@@ -89,15 +87,9 @@ export const tournaments: Texts["tournaments"] = {
   standings: {
     title: "Classifica",
     final: "Classifica finale",
-    place: "Posizione",
-    name: "Nome",
-    games: "Partite",
     score: "Punteggio medio",
     scoreHint: "Punti in media per la posizione in una partita. Decidono l’ordine",
-    points: "Punti",
-    places: "Piazzamenti",
     placesWords: (places) => places.map((count, index) => `${count} × ${index + 1}º posto`).join(", "),
-    rating: "Valutazione",
     ratingHint: "Media e incertezza, dalle partite valutate di questo torneo",
     round: "Ultimo turno",
     forfeited: (count) => plural(count, { one: "# assenza", other: "# assenze" }),
@@ -105,7 +97,6 @@ export const tournaments: Texts["tournaments"] = {
     filler: "completa il tabellone",
     withdrawn: "ha lasciato",
     former: (names) => `prima: ${names}`,
-    away: "non connesso",
     none: "Non si è ancora iscritto nessuno.",
     field: "Partecipanti",
   },
@@ -113,15 +104,10 @@ export const tournaments: Texts["tournaments"] = {
     title: "Partite",
     bracket: "Tabellone",
     due: "non ancora chiamata",
-    playing: "in corso",
     void: "annullata",
-    watch: "Guarda",
-    replay: "Rivedi",
     of: (table, number) => `${table}, partita ${number}`,
-    free: "da decidere",
     from: (first) => `i primi due del tavolo ${first}`,
     forfeited: "non si è presentato",
-    left: "ha lasciato",
     advances: "passa il turno",
     champion: "vince il torneo",
     none: "I tavoli si sorteggiano all’inizio del torneo.",
@@ -150,9 +136,7 @@ export const tournaments: Texts["tournaments"] = {
     text: "Si gioca nel browser. Resta su questa pagina: le tue partite iniziano qui automaticamente.",
     code: "Codice d’ingresso del torneo",
     codeMissing: "Inserisci il codice che ti ha dato chi organizza.",
-    name: "Il tuo nome",
     nameHint: "Lo vedono tutti. Dev’essere unico nel torneo.",
-    nameMissing: "Inserisci un nome.",
     submit: "Iscriviti al torneo",
     notForPeople: "Le persone non possono iscriversi a questo torneo.",
   },
@@ -170,8 +154,6 @@ export const tournaments: Texts["tournaments"] = {
     left: "Non partecipi più a questo torneo. I tuoi risultati ottenuti finora contano.",
     replaced: "Il tuo posto in questo torneo è passato a un’altra persona.",
     over: "Il torneo è finito. Grazie per aver giocato.",
-    connecting: "Connessione…",
-    lost: "Connessione persa. Riconnessione…",
     superseded: "Stai partecipando in un’altra finestra o su un altro dispositivo.",
     takeBack: "Partecipa qui",
     begins: (place) => `La tua partita inizia: ${place}.`,

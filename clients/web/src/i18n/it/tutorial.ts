@@ -1,15 +1,13 @@
 // Italian texts of tutorial/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const tutorial: Texts["tutorial"] = {
-  title: "Impara a giocare",
   you: "Rosa",
   step: (step, all) => `${step} / ${all}`,
   next: "Avanti",
   watch: "Giocano gli altri…",
   play: "Gioca subito una partita",
-  toLobby: "Vai alla sala",
   notThis: "Buona idea per dopo, ma questa lezione chiede altro.",
   lessons: {
     cards:

@@ -1,6 +1,6 @@
 // Italian texts of wizard/.
 
-import type { Texts } from "../en";
+import type { Texts } from "../texts";
 
 export const wizard: Texts["wizard"] = {
   title: "Console",

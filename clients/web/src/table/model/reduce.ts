@@ -37,30 +37,25 @@ export function applyEvent(table: TableState, event: GameEvent): TableState {
   if (!history) return step(table, event);
   const firstVoid = event.kind.case === "correction" ? Number(event.kind.value.firstVoid) : 0;
   if (firstVoid === 0) return { ...step(table, event), history: { ...history, events: [...history.events, event] } };
-  const valid = history.events.filter((past) => Number(past.sequence) < firstVoid || isOfRoom(past));
+  const valid = history.events.filter((past) => Number(past.sequence) < firstVoid || OF_ROOM.includes(past.kind.case));
   const events = [...valid, event];
   return { ...events.reduce(step, history.start), history: { ...history, events } };
 }
 
-/** Whether an event stays when a correction makes the events of the game before it void. */
-function isOfRoom({ kind }: GameEvent): boolean {
-  switch (kind.case) {
-    case "seated":
-    case "vacated":
-    case "disconnected":
-    case "returned":
-    case "substituted":
-    case "expressionShown":
-    case "serverRestarted":
-    case "handReported":
-    case "violation":
-    case "correction":
-    case "tablePaused":
-      return true;
-    default:
-      return false;
-  }
-}
+/** Events that stay when a correction makes the events of the game before it void. */
+const OF_ROOM: readonly GameEvent["kind"]["case"][] = [
+  "seated",
+  "vacated",
+  "disconnected",
+  "returned",
+  "substituted",
+  "expressionShown",
+  "serverRestarted",
+  "handReported",
+  "violation",
+  "correction",
+  "tablePaused",
+];
 
 /** The table after an event and its line in the log. */
 function step(table: TableState, event: GameEvent): TableState {

@@ -1,7 +1,7 @@
 // The rules that matter at a moment of the game, for "What can I do?". Their texts are in i18n.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
-import type { Texts } from "../../i18n/en";
+import type { Texts } from "../../i18n/texts";
 import type { OpenDecision } from "./live";
 import { isOpening, publicRequirement } from "./requirement";
 import type { TableState } from "./state";

@@ -243,8 +243,11 @@ export function emptyTable(seats: readonly SeatState[] = []): TableState {
   };
 }
 
+/** What a table shows of its room or record from the start. */
+type RoomStart = Pick<Room, "seats" | "rules" | "roomId" | "name" | "gameId" | "policy" | "origin">;
+
 /** The table of a room, before its first event. */
-export function tableFromRoom(room: Room): TableState {
+export function tableFromRoom(room: RoomStart): TableState {
   const physical = room.origin === GameOrigin.PHYSICAL;
   const table = {
     ...emptyTable(room.seats.map(seatFromParticipant)),

@@ -154,7 +154,7 @@ function hint({ table, decision, deciding, sending, taught, autoPassing }: Actio
     const more = missing(hand, picked, moves);
     return picked.size > 0 && more ? words.more(more) : words.planHint;
   }
-  if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
+  if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? t().table.reasons.notYourTurn : "";
   if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
   if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, decision);
   if (move) return words.ready;

@@ -20,7 +20,7 @@ export function Log({ table }: { table: TableState }) {
           {visibleLines(table.log, !hidden.value.includes("expressions")).map((line) => {
             const { seat, text } = happeningWords(table, line.entry);
             return (
-              <li key={line.sequence} class={seat === undefined ? css.aside : ""}>
+              <li key={line.sequence} class={seat === undefined ? "soft" : ""}>
                 {seat !== undefined && (
                   <>
                     <SeatNumber seat={seat} />

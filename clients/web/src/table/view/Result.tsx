@@ -80,7 +80,7 @@ function Ways({ table, nextStep }: Pick<ResultProps, "table" | "nextStep">) {
           </ButtonLink>
         )}
         <ButtonLink href="/" look={nextStep || ended ? "plain" : "main"}>
-          {words.lobby}
+          {t().common.toLobby}
         </ButtonLink>
       </span>
     </div>
@@ -99,7 +99,7 @@ function ShiftTable({ table, own, result, onClose }: ShiftTableProps) {
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.shift(result.shift)}>
       <h2>{words.shift(result.shift)}</h2>
-      <Ranking points={[words.points, words.total]}>
+      <Ranking points={[t().common.columns.points, words.total]}>
         {result.order.map((seat, index) => (
           <Row key={seat} table={table} own={own} seat={seat} place={index + 1}>
             <td class="number">+{result.shiftPoints[seat] ?? 0}</td>
@@ -137,7 +137,7 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
         {winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}
       </h2>
       <div class={css.summary}>
-        <Ranking points={[words.points]}>
+        <Ranking points={[t().common.columns.points]}>
           {table.standings.map(({ seat, place, points }) => (
             <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
               <td class="number">{points}</td>
@@ -197,12 +197,12 @@ function Aborted({ table, ways }: EndProps) {
 
 /** The seats by place, a row each; `points`: the headings of the columns after place and name. */
 function Ranking({ points, children }: { points: readonly string[]; children: ComponentChildren }) {
-  const words = t().table.result;
+  const { place, name } = t().common.columns;
   return (
     <table>
       <thead>
         <tr>
-          {[words.place, words.name, ...points].map((heading) => (
+          {[place, name, ...points].map((heading) => (
             <th scope="col" key={heading}>
               {heading}
             </th>

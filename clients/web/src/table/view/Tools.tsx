@@ -76,7 +76,7 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
   return (
     <fieldset class={css.tools} aria-label={words.label}>
       {lookup && (
-        <Tool label={words.lookup} data-part="tool tool-lookup" onClick={() => setOpen(turn ?? "none")}>
+        <Tool label={t().table.lookup.title} data-part="tool tool-lookup" onClick={() => setOpen(turn ?? "none")}>
           <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
         </Tool>
       )}
@@ -86,7 +86,7 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
       </Tool>
       {children}
       {open && (
-        <Dialog title={words.lookup} onClose={() => setOpen(undefined)}>
+        <Dialog title={t().table.lookup.title} onClose={() => setOpen(undefined)}>
           {open === "none" ? (
             <p>{t().table.lookup.none}</p>
           ) : (
