@@ -65,6 +65,11 @@ const participants = [
   participant(2, StudyParticipantState.ACTIVE, ["B"]),
   participant(3, StudyParticipantState.INVITED, []),
 ];
+async function openForm() {
+  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
+  await mount(<NewStudyPage />);
+  await settle();
+}
 const changed = vi.fn<(participant: StudyParticipant) => void>();
 
 test("the form makes the settings of a study, and says what is missing", async () => {
@@ -251,9 +256,7 @@ test.each([
 });
 
 test("removing the last question moves the focus to the button that adds one", async () => {
-  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await mount(<NewStudyPage />);
-  await settle();
+  await openForm();
   const removing = () =>
     [...root.querySelectorAll("button")].filter((one) => one.textContent?.startsWith("Remove this question"));
   for (const _ of [1, 2]) await press("Add a question");
@@ -267,9 +270,7 @@ test("removing the last question moves the focus to the button that adds one", a
 });
 
 test("a number with letters is not taken for an empty field", async () => {
-  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await mount(<NewStudyPage />);
-  await settle();
+  await openForm();
   const width = fieldOf(t().studies.make.minWidth);
   await type(width, "1024px");
   await press(t().studies.make.submit);
@@ -564,9 +565,7 @@ test("a study that cannot be deleted stays, and says why", async () => {
 });
 
 test("a form with wrong fields says so beside its button, and goes to the first of them each time", async () => {
-  vi.spyOn(serverApi, "getServerInfo").mockResolvedValue(create(GetServerInfoResponseSchema));
-  await mount(<NewStudyPage />);
-  await settle();
+  await openForm();
   const form = root.querySelector('[data-part="study-form"]');
   expect(form?.querySelector('[role="alert"]')).toBeNull();
   for (const _ of [1, 2]) {
