@@ -43,7 +43,7 @@ pub fn header(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> GameHeade
         name: "table".into(),
         rules: rules.validate().expect("a valid rule set"),
         rules_version: RULES_VERSION,
-        server_version: "0.0.1".into(),
+        server_version: String::new(),
         participant_removed: false,
         policy,
         display_names: BTreeMap::new(),

@@ -76,6 +76,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         },
         created_at_ms: 1_700_000_000_000,
         join_code: "ABCDEFGH".into(),
+        server_version: "0.0.1".into(),
         ..testing::header(policy, fills, RuleSetSpec::default())
     }
 }

@@ -125,13 +125,15 @@ async fn games_of_what_cannot_be_read_are_kept() {
         ("UPDATE games SET form = 99", true),
     ] {
         with_each_tables(async |store, tables| {
-            let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
+            let change = |change| vec![TournamentEntry::Change(change)];
+            let begun = change(TournamentChange::Begun { rounds: 1 });
+            let created = store.create_tournament(Arc::new(cup(7)), begun).await;
             created.expect("committed");
             for game in [1, 2] {
                 play(store, game, Of::Tournament, Durability::Durable).await;
             }
-            let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
-            let ended = store.append_tournament(TOURNAMENT, 1, end).await;
+            let closed = change(TournamentChange::Closed);
+            let ended = store.append_tournament(TOURNAMENT, 1, closed).await;
             ended.expect("committed");
             tables.edit(damage).await;
             let found = prunable(store, Keep::default()).await;
