@@ -3,6 +3,7 @@
 
 #[cfg(test)]
 mod budget;
+mod ending;
 #[cfg(test)]
 mod fuzz;
 mod health;
@@ -13,7 +14,7 @@ mod probing;
 
 use std::future::Future;
 use std::io;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_proto::v1;
@@ -21,7 +22,7 @@ use futures::future::{BoxFuture, Either, try_join};
 use futures::{FutureExt as _, Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::time::{Instant, timeout_at};
+use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tonic::body::Body;
@@ -29,17 +30,13 @@ use tonic::server::NamedService;
 use tonic::service::{LayerExt as _, Routes};
 use tonic::transport;
 use tonic::transport::server::Connected;
-use tonic_health::ServingStatus;
 use tower::util::{MapRequestLayer, MapResponseLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, Call, TokenFileError};
 use crate::cluster::{Directory, NodeLease, SingleServer, StoreDirectory};
-use crate::config::{
-    CLOSE_LIMIT, DRAIN_LIMIT, END_LIMIT, HAND_OVER_LIMIT, MAX_STREAMS_PER_CONNECTION, ServerConfig,
-    longest_shutdown,
-};
+use crate::config::{DRAIN_LIMIT, MAX_STREAMS_PER_CONNECTION, ServerConfig};
 use crate::connections::{self, Client, Connection, Connections, Limits, Listener};
 use crate::forwarded::note_clients;
 use crate::front::InFront;
@@ -51,7 +48,8 @@ use crate::metrics::Metrics;
 use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
 use crate::peers::{
-    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, STREAM_WINDOW,
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, Peers,
+    STREAM_WINDOW,
 };
 use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
@@ -65,6 +63,7 @@ use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
 use crate::wire::peer::peer_service_server::PeerServiceServer;
+use ending::Ending;
 
 /// Most bytes of a client that wait on one stream to be read.
 const CLIENT_STREAM_WINDOW: u32 = 256 * 1024;
@@ -333,7 +332,7 @@ impl Server {
     /// # Errors
     /// The transport or store failed, or an allowed origin is not a web origin.
     pub async fn serve_incoming<I, C>(
-        self,
+        mut self,
         incoming: I,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError>
@@ -341,215 +340,41 @@ impl Server {
         I: Stream<Item = io::Result<C>> + Send,
         C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
     {
-        let Self {
-            config,
-            store,
-            rooms,
-            tournaments,
-            studies,
-            access,
-            tls,
-            peers,
-            mut node,
-            calls,
-            connections,
-            tracker,
-            ..
-        } = self;
+        let ending = Ending::of(&self);
+        let mut node = self.node.take();
         let is_node = node.is_some();
-        let closing = CancellationToken::new();
-        let spawn = |task, work: BoxFuture<'static, ()>| {
-            let until_closing = closing.clone().run_until_cancelled_owned(work);
-            tracker.spawn(named(task, until_closing))
-        };
-        spawn(
-            LongTask::StalledConnections,
-            Arc::clone(&connections).close_stalled().boxed(),
-        );
-        let retention = Retention::new(Arc::clone(&rooms));
-        if let Some(keep) = config.keep_games {
-            spawn(LongTask::Retention, retention.clone().follow(keep).boxed());
-        }
-        spawn(
-            LongTask::StudyDeletion,
-            Arc::clone(&studies).delete_when_due().boxed(),
-        );
-        // Above any encryption, because it reads frames.
-        let first_bytes = config.first_bytes_timeout;
-        let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));
         let (health, health_service) = tonic_health::server::health_reporter();
-        let closed = closing.clone();
-        let ending = MapResponseLayer::new(move |it| grpc::until_closing(it, &closed));
-        let routes = routes(
-            &rooms,
-            (&tournaments, &studies),
-            &calls,
-            &connections,
-            &config,
-            &closing,
-            retention,
-        )?
-        .add_service(ending.named_layer(health_service))
-        .add_service(ending.named_layer(reflection()));
+        let retention = Retention::new(Arc::clone(&self.rooms));
+        let closed = ending.closing.clone();
+        let until_closing = MapResponseLayer::new(move |it| grpc::until_closing(it, &closed));
+        let routes = self
+            .routes(&ending.closing, retention.clone())?
+            .add_service(until_closing.named_layer(health_service))
+            .add_service(until_closing.named_layer(reflection()));
+        let to_others = self.peers.as_ref();
+        let to_others = to_others.map(|port| port.peers(self.rooms.metrics()));
+        self.spawn_tasks(&ending.closing, retention, to_others.as_ref());
         let following = health::report(
             health.clone(),
             node.as_ref().map(ClusterNode::serves),
-            store.metrics().cloned(),
+            self.store.metrics().cloned(),
         );
-        let following = spawn(LongTask::Health, following.boxed());
-
-        spawn(LongTask::TokenFile, Arc::clone(&access).follow().boxed());
-        let delivering = rooms.webhooks().clone().deliver(closing.clone());
-        tracker.spawn(named(LongTask::Webhooks, delivering));
-        let encrypted = tls.is_some();
-        let of_nodes = peers.as_ref().and_then(PeerPort::tls);
-        let shown_to = |whom: &'static str, tls: Option<Arc<Tls>>| tls.map(|tls| (whom, tls));
-        let shown = [shown_to("clients", tls), shown_to("nodes", of_nodes)];
-        let shown: Vec<_> = shown.into_iter().flatten().collect();
-        for (_, tls) in &shown {
-            let follow = Arc::clone(tls).follow();
-            spawn(LongTask::Certificates, follow.boxed());
-        }
-        scrape::add_certificates(rooms.metrics(), shown);
-        let directory = Arc::clone(rooms.directory());
-        let to_others = (peers.as_ref()).map(|port| port.peers(rooms.metrics()));
-        if let Some(lease) = rooms.lease() {
-            let joining =
-                joining::be_reached(Arc::clone(lease), Arc::clone(&directory), to_others.clone());
-            spawn(LongTask::Joining, joining.boxed());
-        }
-        if let Some(peers) = to_others.clone() {
-            let signing_key = rooms.signing_key();
-            let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
-            let metrics = Arc::clone(rooms.metrics());
-            let probing = probing::probe(Arc::clone(&directory), peers, signing_key, metrics);
-            spawn(LongTask::Probing, probing.boxed());
-        }
-        let forwarding = to_others.clone().map(|to_others| {
-            grpc::ForwardLayer::new(Arc::clone(&directory), to_others, Arc::clone(&calls))
-        });
-        let play = grpc::Play::new(
-            Arc::clone(&rooms),
-            Arc::clone(&tournaments),
-            closing.clone(),
-        );
-        let peer_serving = match peers.zip(to_others) {
+        let following = self.spawn(&ending.closing, LongTask::Health, following);
+        let peers = self.peers.take().zip(to_others.clone());
+        let peer_serving = match peers {
             None => Either::Left(std::future::ready(Ok(()))),
             Some((port, to_others)) => {
-                let of_nodes = grpc::OfNodes::new(play, directory, to_others);
-                let of_nodes = served!(PeerServiceServer, of_nodes);
-                let closed = closing.clone();
-                Either::Right(
-                    transport::Server::builder()
-                        .http2_max_header_list_size(MAX_HEADER_BYTES)
-                        .max_concurrent_streams(None)
-                        .initial_stream_window_size(STREAM_WINDOW)
-                        .initial_connection_window_size(CONNECTION_WINDOW)
-                        .http2_keepalive_interval(Some(PING_INTERVAL))
-                        .http2_keepalive_timeout(Some(PING_TIMEOUT))
-                        .http2_max_pending_accept_reset_streams(Some(MAX_RESET_STREAMS))
-                        .http2_max_local_error_reset_streams(None)
-                        .layer(MapRequestLayer::new(from_peer))
-                        .layer(note_clients(TrustedProxies::new([
-                            TrustedProxy::UnixSocket,
-                        ])))
-                        .layer(grpc::count_refusals(rooms.metrics()))
-                        .layer(grpc::AccessLayer::new(
-                            Arc::clone(&access),
-                            Arc::clone(&calls),
-                        ))
-                        .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
-                        .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
-                        .add_routes(routes.clone().add_service(of_nodes))
-                        .serve_with_incoming_shutdown(
-                            port.incoming(rooms.metrics())?
-                                .map_ok(move |it| Metered::of_trusted(it, first_bytes)),
-                            async move { closed.cancelled().await },
-                        ),
-                )
+                let serving = self.serve_peers(port, to_others, routes.clone(), &ending.closing)?;
+                Either::Right(serving)
             }
         };
-        let closed = closing.clone();
-        let origins = Origins::new(&config.allowed_origins, config.allowed_hosts.clone());
-        let cors = cors(origins.listed())?;
-        let mut builder = transport::Server::builder();
-        if let Some(age) = config.max_connection_age {
-            builder = builder.max_connection_age(age);
-        }
-        let serving = builder
-            .accept_http1(true)
-            .tcp_nodelay(true)
-            .http2_max_header_list_size(MAX_HEADER_BYTES)
-            .initial_stream_window_size(CLIENT_STREAM_WINDOW)
-            .initial_connection_window_size(CLIENT_CONNECTION_WINDOW)
-            .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
-            .layer(note_clients(config.trusted_proxies.clone()))
-            .layer(OriginLayer::new(origins, Arc::clone(&calls)))
-            .layer(cors)
-            .layer(PageLayer::new(
-                encrypted,
-                Arc::clone(&calls),
-                Arc::clone(&rooms),
-                config.painter.clone(),
-            )?)
-            .layer(tonic_web::GrpcWebLayer::new())
-            .layer(InFront(grpc::HeartbeatLayer))
-            .layer(grpc::count_refusals(rooms.metrics()))
-            .layer(option_layer(forwarding))
-            .layer(grpc::AccessLayer::new(
-                Arc::clone(&access),
-                Arc::clone(&calls),
-            ))
-            .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
-            .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
-            .add_routes(routes)
-            .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
+        let serving = self.serve_clients(incoming, to_others, routes, &ending.closing)?;
 
-        let shutdown_began = OnceLock::new();
-        let ending = async {
-            match &node {
-                None => shutdown.await,
-                Some(node) => tokio::select! {
-                    () = shutdown => {}
-                    () = node.asked_to_drain() => info!("asked to hand over to the other nodes"),
-                },
-            }
-            info!(
-                grace_seconds = config.grace.as_secs(),
-                open_rooms = rooms.open_count(),
-                "shutting down: no new rooms; running games may finish"
-            );
-            following.abort();
-            health
-                .set_service_status("", ServingStatus::NotServing)
-                .await;
-            // All steps share one budget.
-            let began = *shutdown_began.get_or_init(Instant::now);
-            let games_end = began + config.grace.max(HAND_OVER_LIMIT) + END_LIMIT;
-            if let Some(node) = &mut node {
-                rooms.refuse_new();
-                if timeout_at(games_end, node.drain()).await.is_err() {
-                    warn!(
-                        "not everything was handed over; other nodes take it over when the lease expires"
-                    );
-                    rooms.fence_all();
-                }
-            }
-            store.stop_waiting();
-            // Games that end from here on count when the server is restarted.
-            tournaments.stop();
-            studies.stop();
-            let grace_left = (began + config.grace).saturating_duration_since(Instant::now());
-            let ended = timeout_at(games_end, rooms.shut_down(grace_left)).await;
-            if ended.is_err() {
-                warn!("not all games could be suspended in time; their journals are stored");
-            }
-            tournaments.end();
-            studies.end();
-            closing.cancel();
-        };
+        let tracker = self.tracker.clone();
         let ended_or_drained = async {
-            ending.await;
+            ending
+                .begin(shutdown, node.as_mut(), &health, following)
+                .await;
             tokio::time::sleep(DRAIN_LIMIT).await;
         };
         tokio::select! {
@@ -557,26 +382,250 @@ impl Server {
             () = ended_or_drained => warn!("dropping connections that do not close"),
             // Nothing more can be acknowledged: waiting clients learn it at once when the process
             // ends.
-            failure = store.failed() => return Err(ServeError::Store(failure)),
+            failure = ending.store.failed() => return Err(ServeError::Store(failure)),
         }
-        tournaments.end();
-        studies.end();
-        drop((rooms, tournaments, studies));
-        tracker.close();
-        // The database may be away, for which a node does not wait.
-        let began = shutdown_began.get().copied().filter(|_| !is_node);
-        let latest = began.map(|began| began + longest_shutdown(config.grace));
-        let soonest = Instant::now() + DRAIN_LIMIT;
-        let end = latest.map_or(soonest, |latest| soonest.max(latest - CLOSE_LIMIT));
-        if timeout_at(end, tracker.wait()).await.is_err() {
-            warn!("not everything that was to be written or sent has been");
-        }
-        let soonest = Instant::now() + CLOSE_LIMIT;
-        let end = latest.map_or(soonest, |latest| soonest.max(latest));
-        if timeout_at(end, store.close()).await.is_err() {
-            warn!("the database was not closed in time; what was acknowledged is stored");
-        }
+        drop(self);
+        ending.finish(&tracker, is_node).await;
         Ok(())
+    }
+
+    /// Spawns a task that ends when the server closes its connections.
+    fn spawn(
+        &self,
+        closing: &CancellationToken,
+        task: LongTask,
+        work: impl Future<Output = ()> + Send + 'static,
+    ) -> JoinHandle<Option<()>> {
+        // Boxed, so that the loop around it is compiled once.
+        let until_closing = closing.clone().run_until_cancelled_owned(work.boxed());
+        self.tracker.spawn(named(task, until_closing))
+    }
+
+    /// Spawns what a server does besides answering calls.
+    fn spawn_tasks(
+        &self,
+        closing: &CancellationToken,
+        retention: Retention,
+        to_others: Option<&Arc<Peers>>,
+    ) {
+        let (rooms, directory) = (&self.rooms, self.rooms.directory());
+        let stalled = Arc::clone(&self.connections).close_stalled();
+        self.spawn(closing, LongTask::StalledConnections, stalled);
+        if let Some(keep) = self.config.keep_games {
+            self.spawn(closing, LongTask::Retention, retention.follow(keep));
+        }
+        let deletion = Arc::clone(&self.studies).delete_when_due();
+        self.spawn(closing, LongTask::StudyDeletion, deletion);
+        let tokens = Arc::clone(&self.access).follow();
+        self.spawn(closing, LongTask::TokenFile, tokens);
+        let delivering = rooms.webhooks().clone().deliver(closing.clone());
+        self.tracker.spawn(named(LongTask::Webhooks, delivering));
+        let of_nodes = self.peers.as_ref().and_then(PeerPort::tls);
+        let shown = [("clients", self.tls.clone()), ("nodes", of_nodes)];
+        let shown = shown
+            .into_iter()
+            .filter_map(|(whom, tls)| Some((whom, tls?)));
+        let shown: Vec<_> = shown.collect();
+        for (_, tls) in &shown {
+            self.spawn(closing, LongTask::Certificates, Arc::clone(tls).follow());
+        }
+        scrape::add_certificates(rooms.metrics(), shown);
+        if let Some(lease) = rooms.lease() {
+            let (lease, directory) = (Arc::clone(lease), Arc::clone(directory));
+            let joining = joining::be_reached(lease, directory, to_others.cloned());
+            self.spawn(closing, LongTask::Joining, joining);
+        }
+        if let Some(peers) = to_others.cloned() {
+            let signing_key = rooms.signing_key();
+            let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
+            let metrics = Arc::clone(rooms.metrics());
+            let probing = probing::probe(Arc::clone(directory), peers, signing_key, metrics);
+            self.spawn(closing, LongTask::Probing, probing);
+        }
+    }
+
+    /// Answers the calls of other nodes until the server closes its connections.
+    fn serve_peers(
+        &self,
+        port: PeerPort,
+        to_others: Arc<Peers>,
+        routes: Routes,
+        closing: &CancellationToken,
+    ) -> Result<impl Future<Output = Result<(), transport::Error>>, ServeError> {
+        let rooms = &self.rooms;
+        let play = grpc::Play::new(
+            Arc::clone(rooms),
+            Arc::clone(&self.tournaments),
+            closing.clone(),
+        );
+        let of_nodes = grpc::OfNodes::new(play, Arc::clone(rooms.directory()), to_others);
+        let of_nodes = served!(PeerServiceServer, of_nodes);
+        let first_bytes = self.config.first_bytes_timeout;
+        let incoming = port
+            .incoming(rooms.metrics())?
+            .map_ok(move |it| Metered::of_trusted(it, first_bytes));
+        Ok(transport::Server::builder()
+            .http2_max_header_list_size(MAX_HEADER_BYTES)
+            .max_concurrent_streams(None)
+            .initial_stream_window_size(STREAM_WINDOW)
+            .initial_connection_window_size(CONNECTION_WINDOW)
+            .http2_keepalive_interval(Some(PING_INTERVAL))
+            .http2_keepalive_timeout(Some(PING_TIMEOUT))
+            .http2_max_pending_accept_reset_streams(Some(MAX_RESET_STREAMS))
+            .http2_max_local_error_reset_streams(None)
+            .layer(MapRequestLayer::new(from_peer))
+            .layer(note_clients(TrustedProxies::new([
+                TrustedProxy::UnixSocket,
+            ])))
+            .layer(grpc::count_refusals(rooms.metrics()))
+            .layer(grpc::AccessLayer::new(
+                Arc::clone(&self.access),
+                Arc::clone(&self.calls),
+            ))
+            .layer(grpc::LimitsLayer::new(Arc::clone(&self.calls)))
+            .layer(grpc::DecodingLayer::new(Arc::clone(&self.calls)))
+            .add_routes(routes.add_service(of_nodes))
+            .serve_with_incoming_shutdown(incoming, closing.clone().cancelled_owned()))
+    }
+
+    /// Answers the calls of clients, and serves the page, until the server closes its connections.
+    fn serve_clients<I, C>(
+        &self,
+        incoming: I,
+        to_others: Option<Arc<Peers>>,
+        routes: Routes,
+        closing: &CancellationToken,
+    ) -> Result<impl Future<Output = Result<(), transport::Error>>, ServeError>
+    where
+        I: Stream<Item = io::Result<C>> + Send,
+        C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+    {
+        let (config, rooms, calls) = (&self.config, &self.rooms, &self.calls);
+        // Above any encryption, because it reads frames.
+        let first_bytes = config.first_bytes_timeout;
+        let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));
+        let forwarding = to_others.map(|to_others| {
+            grpc::ForwardLayer::new(Arc::clone(rooms.directory()), to_others, Arc::clone(calls))
+        });
+        let origins = Origins::new(&config.allowed_origins, config.allowed_hosts.clone());
+        let cors = cors(origins.listed())?;
+        let mut builder = transport::Server::builder();
+        if let Some(age) = config.max_connection_age {
+            builder = builder.max_connection_age(age);
+        }
+        Ok(builder
+            .accept_http1(true)
+            .tcp_nodelay(true)
+            .http2_max_header_list_size(MAX_HEADER_BYTES)
+            .initial_stream_window_size(CLIENT_STREAM_WINDOW)
+            .initial_connection_window_size(CLIENT_CONNECTION_WINDOW)
+            .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
+            .layer(note_clients(config.trusted_proxies.clone()))
+            .layer(OriginLayer::new(origins, Arc::clone(calls)))
+            .layer(cors)
+            .layer(PageLayer::new(
+                self.tls.is_some(),
+                Arc::clone(calls),
+                Arc::clone(rooms),
+                config.painter.clone(),
+            )?)
+            .layer(tonic_web::GrpcWebLayer::new())
+            .layer(InFront(grpc::HeartbeatLayer))
+            .layer(grpc::count_refusals(rooms.metrics()))
+            .layer(option_layer(forwarding))
+            .layer(grpc::AccessLayer::new(
+                Arc::clone(&self.access),
+                Arc::clone(calls),
+            ))
+            .layer(grpc::LimitsLayer::new(Arc::clone(calls)))
+            .layer(grpc::DecodingLayer::new(Arc::clone(calls)))
+            .add_routes(routes)
+            .serve_with_incoming_shutdown(incoming, closing.clone().cancelled_owned()))
+    }
+
+    /// The services for clients.
+    fn routes(
+        &self,
+        closing: &CancellationToken,
+        retention: Retention,
+    ) -> Result<Routes, ServeError> {
+        use crate::wire::service::play_service_server::PlayServiceServer;
+        use crate::wire::service::spectator_service_server::SpectatorServiceServer;
+        use v1::admin_service_server::AdminServiceServer;
+        use v1::analysis_service_server::AnalysisServiceServer;
+        use v1::instrument_service_server::InstrumentServiceServer;
+        use v1::participation_service_server::ParticipationServiceServer;
+        use v1::record_service_server::RecordServiceServer;
+        use v1::room_service_server::RoomServiceServer;
+        use v1::server_service_server::ServerServiceServer;
+        use v1::study_service_server::StudyServiceServer;
+        use v1::table_service_server::TableServiceServer;
+        use v1::tournament_service_server::TournamentServiceServer;
+        use v1::vector_service_server::VectorServiceServer;
+        let Self {
+            config,
+            rooms,
+            tournaments,
+            studies,
+            calls,
+            connections,
+            ..
+        } = self;
+        let lookup = grpc::Lookup::new(Arc::clone(rooms), Arc::clone(tournaments));
+        let recorded = grpc::Recorded::new(lookup.clone(), config.access.records)?;
+        let study_calls = grpc::StudyCalls::new(
+            Arc::clone(studies),
+            lookup.clone(),
+            Arc::clone(calls),
+            closing.clone(),
+        );
+        let participants = Participants::new(
+            Arc::clone(rooms),
+            Arc::clone(tournaments),
+            Arc::clone(studies),
+        );
+        let admin = grpc::AdminCalls::new(
+            lookup.clone(),
+            Arc::clone(connections),
+            retention,
+            Arc::new(participants),
+            closing.clone(),
+        );
+        let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
+        let analyses =
+            grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
+        let play = grpc::Play::new(Arc::clone(rooms), Arc::clone(tournaments), closing.clone());
+        let tournament_calls = grpc::TournamentCalls::new(
+            Arc::clone(tournaments),
+            recorded.clone(),
+            Arc::clone(calls),
+            closing.clone(),
+        );
+        let room_calls = grpc::RoomCalls::new(
+            Arc::clone(rooms),
+            recorded.clone(),
+            Arc::clone(calls),
+            config.client_endpoint.as_deref(),
+        );
+        let spectate = grpc::Spectate::new(lookup.clone(), closing.clone());
+        let tables = grpc::TableCalls::new(lookup.clone());
+        let instruments = grpc::Instruments::new(lookup.clone());
+        let records =
+            grpc::Records::new(recorded, Arc::clone(tournaments), config, closing.clone());
+        let info = grpc::Info::new(lookup, calls, config);
+        Ok(Routes::new(served!(PlayServiceServer, play))
+            .add_service(served!(TournamentServiceServer, tournament_calls))
+            .add_service(served!(StudyServiceServer, study_calls.clone()))
+            .add_service(served!(ParticipationServiceServer, study_calls))
+            .add_service(served!(RoomServiceServer, room_calls))
+            .add_service(served!(SpectatorServiceServer, spectate))
+            .add_service(served!(TableServiceServer, tables))
+            .add_service(served!(InstrumentServiceServer, instruments))
+            .add_service(served!(RecordServiceServer, records))
+            .add_service(served!(VectorServiceServer, vectors))
+            .add_service(served!(AnalysisServiceServer, analyses))
+            .add_service(served!(AdminServiceServer, admin))
+            .add_service(served!(ServerServiceServer, info)))
     }
 }
 
@@ -586,83 +635,6 @@ fn from_peer(mut request: http::Request<Body>) -> http::Request<Body> {
     request.extensions_mut().remove::<Arc<Client>>();
     request.extensions_mut().insert(grpc::FromPeer);
     request
-}
-
-fn routes(
-    rooms: &Arc<Rooms>,
-    (tournaments, studies): (&Arc<Tournaments>, &Arc<Studies>),
-    calls: &Arc<CallLimits>,
-    connections: &Arc<Connections>,
-    config: &ServerConfig,
-    closing: &CancellationToken,
-    retention: Retention,
-) -> Result<Routes, ServeError> {
-    use crate::wire::service::play_service_server::PlayServiceServer;
-    use crate::wire::service::spectator_service_server::SpectatorServiceServer;
-    use v1::admin_service_server::AdminServiceServer;
-    use v1::analysis_service_server::AnalysisServiceServer;
-    use v1::instrument_service_server::InstrumentServiceServer;
-    use v1::participation_service_server::ParticipationServiceServer;
-    use v1::record_service_server::RecordServiceServer;
-    use v1::room_service_server::RoomServiceServer;
-    use v1::server_service_server::ServerServiceServer;
-    use v1::study_service_server::StudyServiceServer;
-    use v1::table_service_server::TableServiceServer;
-    use v1::tournament_service_server::TournamentServiceServer;
-    use v1::vector_service_server::VectorServiceServer;
-    let lookup = grpc::Lookup::new(Arc::clone(rooms), Arc::clone(tournaments));
-    let recorded = grpc::Recorded::new(lookup.clone(), config.access.records)?;
-    let study_calls = grpc::StudyCalls::new(
-        Arc::clone(studies),
-        lookup.clone(),
-        Arc::clone(calls),
-        closing.clone(),
-    );
-    let participants = Participants::new(
-        Arc::clone(rooms),
-        Arc::clone(tournaments),
-        Arc::clone(studies),
-    );
-    let admin = grpc::AdminCalls::new(
-        lookup.clone(),
-        Arc::clone(connections),
-        retention,
-        Arc::new(participants),
-        closing.clone(),
-    );
-    let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
-    let analyses = grpc::Analyses::new(recorded.clone(), config.vector_threads, closing.clone())?;
-    let play = grpc::Play::new(Arc::clone(rooms), Arc::clone(tournaments), closing.clone());
-    let tournament_calls = grpc::TournamentCalls::new(
-        Arc::clone(tournaments),
-        recorded.clone(),
-        Arc::clone(calls),
-        closing.clone(),
-    );
-    let room_calls = grpc::RoomCalls::new(
-        Arc::clone(rooms),
-        recorded.clone(),
-        Arc::clone(calls),
-        config.client_endpoint.as_deref(),
-    );
-    let spectate = grpc::Spectate::new(lookup.clone(), closing.clone());
-    let tables = grpc::TableCalls::new(lookup.clone());
-    let instruments = grpc::Instruments::new(lookup.clone());
-    let records = grpc::Records::new(recorded, Arc::clone(tournaments), config, closing.clone());
-    let info = grpc::Info::new(lookup, calls, config);
-    Ok(Routes::new(served!(PlayServiceServer, play))
-        .add_service(served!(TournamentServiceServer, tournament_calls))
-        .add_service(served!(StudyServiceServer, study_calls.clone()))
-        .add_service(served!(ParticipationServiceServer, study_calls))
-        .add_service(served!(RoomServiceServer, room_calls))
-        .add_service(served!(SpectatorServiceServer, spectate))
-        .add_service(served!(TableServiceServer, tables))
-        .add_service(served!(InstrumentServiceServer, instruments))
-        .add_service(served!(RecordServiceServer, records))
-        .add_service(served!(VectorServiceServer, vectors))
-        .add_service(served!(AnalysisServiceServer, analyses))
-        .add_service(served!(AdminServiceServer, admin))
-        .add_service(served!(ServerServiceServer, info)))
 }
 
 fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<

@@ -415,16 +415,9 @@ async fn serve_edited(which: usize, edits: &Edits, frames: bool) {
         .await
         .expect("an empty store");
     let closing = CancellationToken::new();
-    let routes = routes(
-        &server.rooms,
-        (&server.tournaments, &server.studies),
-        &server.calls,
-        &server.connections,
-        &server.config,
-        &closing,
-        Retention::new(Arc::clone(&server.rooms)),
-    )
-    .expect("valid settings");
+    let retention = Retention::new(Arc::clone(&server.rooms));
+    let routes = server.routes(&closing, retention);
+    let routes = routes.expect("valid settings");
     let room: v1::CreateRoomResponse =
         call_once(&routes, "RoomService/CreateRoom", &create_room()).await;
     let seat: v1::JoinRoomResponse = call_once(&routes, "RoomService/JoinRoom", &join(&room)).await;
