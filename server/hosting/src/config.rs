@@ -1,4 +1,4 @@
-//! The settings of a server and its limits.
+//! The settings of a server, and bounds that several parts share or that docs/hosting.md lists.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,10 +21,6 @@ pub const MAX_STREAMS_PER_CONNECTION: u32 = 1_024;
 pub const MAX_SEATS_PER_STREAM: usize = 4_096;
 /// Most seats named in one Watch.
 pub const MAX_SEATS_PER_WATCH: usize = 64;
-/// Most commands in one message.
-pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
-/// Most commands of a seat that wait for its attachment while another stream has it.
-pub const MAX_COMMANDS_CONTESTED: usize = 64;
 /// Games that are deleted in one commit: rooms wait for it.
 pub const GAMES_DELETED_AT_ONCE: usize = 16;
 /// Pause between two such commits, in which rooms commit.
@@ -35,56 +31,25 @@ pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 pub const PICTURE_PATIENCE: Duration = Duration::from_secs(30);
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
-/// Largest batch of a vector stream, bytes.
-pub const MAX_VECTOR_BATCH_BYTES: usize = chefshat_vector::MAX_BATCH_BYTES;
 /// Most vector streams at a time.
 pub const MAX_VECTOR_STREAMS: usize = 128;
 /// Most seats played on all vector streams together, games times seats: about 5 KB each. The
 /// default share of one caller is as many as one stream may have.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 163_840;
-/// Most seats played on one vector stream, games times seats.
-pub const MAX_VECTOR_SEATS: usize = Limits::OF_SERVER.seats_played as usize;
-/// Most game seeds in one message.
-pub const MAX_VECTOR_SEEDS: usize = Limits::OF_SERVER.seeds;
-/// Most games of a vector stream with records.
-pub const MAX_VECTOR_RECORDED_GAMES: u32 = Limits::OF_SERVER.recorded_games;
 /// Most multiplications for a decision of a network file of a vector stream.
 pub const MAX_VECTOR_NETWORK_MULTIPLICATIONS: u64 = Limits::OF_SERVER.network_multiplications;
 /// How long a client may take to send the setup of a vector stream.
 pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(10);
-/// How long a client may think about a batch.
-pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
-/// How long a client may take to receive one message.
-pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
-/// Time of a hint.
-pub const HINT_TIME: Duration = Duration::from_millis(400);
 /// Most analyses at a time, those waiting for a thread included.
 pub const MAX_ANALYSES: usize = 64;
 /// Most rollouts of an analysis.
 pub const MAX_ANALYSIS_ROLLOUTS: u64 = 1_000_000;
-/// Most steps of counting the deals of an analysis; a step takes 8 bytes at most.
-pub const MAX_ANALYSIS_STEPS: u64 = 500_000;
-/// Time of an analysis that names none.
-pub const ANALYSIS_TIME: Duration = Duration::from_secs(1);
 /// Longest time of an analysis.
 pub const MAX_ANALYSIS_TIME: Duration = Duration::from_secs(10);
-/// How many times its time the slices of an analysis may take before it ends with what it has: other
-/// programs on the machine may leave it hardly any processor time.
-pub const ANALYSIS_PATIENCE: u32 = 10;
-/// The least such time.
-pub const MIN_ANALYSIS_PATIENCE: Duration = Duration::from_secs(30);
-/// Least time between estimates so far of an analysis.
-pub const MIN_ANALYSIS_UPDATE: Duration = Duration::from_millis(50);
-/// Largest record that may be imported, bytes as encoded.
-pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Bytes of records that are received for import in a second, of all imports together.
 pub const IMPORT_RATE: usize = 16 * 1024 * 1024;
-/// Most lines of a record that may be imported.
-pub const MAX_IMPORT_LINES: usize = 1_500_000;
 /// Most bytes of memory that the lines of all records take that are being imported.
 pub const MAX_IMPORT_MEMORY: usize = 192 * 1024 * 1024;
-/// How long the upload of a record may take.
-pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
 /// How long a client may take to send the next part of a record.
 pub const IMPORT_IDLE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most uploads of records at a time.
@@ -95,8 +60,6 @@ pub const MAX_RECORDS_SENT: usize = 8;
 pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most tournaments, including ended ones that are still listed.
 pub const MAX_TOURNAMENTS: usize = 256;
-/// Messages that may wait for one tournament.
-pub const TOURNAMENT_MAILBOX: usize = 256;
 /// Most studies.
 pub const MAX_STUDIES: usize = 256;
 /// Most bytes of memory that the settings of all studies take. Decoding them is costed, which is
@@ -104,49 +67,14 @@ pub const MAX_STUDIES: usize = 256;
 pub const MAX_STUDY_MEMORY: usize = 48 * 1024 * 1024;
 /// Most bytes of memory that the participants of all studies and their answers take.
 pub const MAX_STUDY_DATA: usize = 64 * 1024 * 1024;
-/// Messages that may wait for one study.
-pub const STUDY_MAILBOX: usize = 256;
-/// Most participants that one request adds to a study.
-pub const MAX_STUDY_ADDED: usize = 1_000;
-/// Most participants in one message to a follower of a study.
-pub const MAX_STUDY_PARTICIPANTS_SENT: usize = 200;
-/// Most bytes in one message of the data of a study.
-pub const STUDY_EXPORT_CHUNK: usize = 64 * 1024;
 /// Most streams that follow studies, and of participants.
 pub const MAX_STUDY_STREAMS: usize = 4_096;
-/// Most calls to games that may wait for one stream; a further one ends the stream.
-pub const MAX_CALLS_WAITING: usize = 4_096;
-/// How long a tournament stays open if nobody joins or starts it.
-pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
-/// How far ahead the start of a tournament may be set.
-pub const MAX_START_AHEAD: Duration = Duration::from_secs(366 * 24 * 3_600);
-/// Most participants of one caller who withdraw from a tournament before it begins, so that nobody
-/// fills its journal by joining and withdrawing.
-pub const MAX_EARLY_WITHDRAWALS_OF_CALLER: u32 = 20;
-/// How long a tournament stays paused.
-pub const TOURNAMENT_PAUSE: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// Most streams that follow tournaments.
 pub const MAX_FOLLOWERS: usize = 1_024;
 /// Shortest time between two updates of a followed tournament.
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
-/// Most updates for followers, and most results, that are computed at a time.
-pub const MAX_CONCURRENT_RESULTS: usize = 2;
-/// Most games in an update of a followed tournament. It keeps a message well below the 4 MB that
-/// clients accept by default. At most half as many are played at a time.
-pub const MAX_GAMES_FOLLOWED: usize = 512;
 /// How long a follower may take to receive an update.
 pub const FOLLOW_SEND_TIMEOUT: Duration = Duration::from_secs(30);
-/// Most games of a tournament in one page.
-pub const MAX_GAMES_PAGE: u32 = 500;
-/// Most rows of a leaderboard.
-pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
-/// How old a cached leaderboard may be.
-pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
-/// Time between two readings of all games for the leaderboard: until then it may count games that
-/// were deleted, and show a name that another node deleted.
-pub const LEADERBOARD_READ_AGAIN: Duration = Duration::from_secs(600);
-/// 1/N of the time may be spent computing the leaderboard.
-pub const LEADERBOARD_SHARE: u32 = 10;
 /// How long open streams and connections may delay a shutdown, and then what is still written.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest time for which a node of a cluster that ends hands over what it owns, unless the grace for
@@ -161,9 +89,6 @@ pub const CLOSE_LIMIT: Duration = Duration::from_secs(5);
 pub fn longest_shutdown(grace: Duration) -> Duration {
     grace.max(HAND_OVER_LIMIT) + END_LIMIT + 2 * DRAIN_LIMIT + CLOSE_LIMIT
 }
-
-/// Interval of heartbeats on an idle stream, unless its client asks for another.
-pub const HEARTBEAT: Duration = Duration::from_secs(15);
 
 /// How many games a server keeps by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -33,10 +33,19 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Payer, Queued, Refused, SLICE, WorkQueue};
 use chefshat_base::tasks::short;
 use chefshat_base::threads::{Priority, Threads};
-use chefshat_hosting::config::{
-    ANALYSIS_PATIENCE, ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS,
-    MAX_ANALYSIS_TIME, MIN_ANALYSIS_PATIENCE, MIN_ANALYSIS_UPDATE,
-};
+use chefshat_hosting::config::{MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME};
+
+/// Most steps of counting the deals of an analysis; a step takes 8 bytes at most.
+const MAX_ANALYSIS_STEPS: u64 = 500_000;
+/// Time of an analysis that names none.
+const ANALYSIS_TIME: Duration = Duration::from_secs(1);
+/// How many times its time the slices of an analysis may take before it ends with what it has: other
+/// programs on the machine may leave it hardly any processor time.
+const ANALYSIS_PATIENCE: u32 = 10;
+/// The least such time.
+const MIN_ANALYSIS_PATIENCE: Duration = Duration::from_secs(30);
+/// Least time between estimates so far of an analysis.
+const MIN_ANALYSIS_UPDATE: Duration = Duration::from_millis(50);
 
 /// Most deals from which the likely hands are averaged.
 const DEALS_FOR_HANDS: u64 = 500;

@@ -18,7 +18,9 @@ use tower::Service;
 
 use crate::front::Front;
 use chefshat_admission::access::Call;
-use chefshat_hosting::config::HEARTBEAT;
+
+/// Interval of heartbeats on an idle stream, unless its client asks for another.
+const HEARTBEAT: Duration = Duration::from_secs(15);
 
 /// Seconds between the heartbeats of a call, if not as many as by default.
 const HEADER: &str = "chefshat-heartbeat";

@@ -23,11 +23,11 @@ use chefshat_base::SERVER_VERSION;
 use chefshat_base::clock::since_epoch;
 use chefshat_hosting::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_SEATS_PER_STREAM,
-    MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES,
-    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS,
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
+    MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS,
+    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, ServerConfig,
 };
 use chefshat_hosting::room::MAX_SPECTATORS;
+use chefshat_vector::{Limits, MAX_BATCH_BYTES};
 use chefshat_wire::convert;
 use chefshat_wire::convert::MAX_HOSTED_SHIFTS;
 
@@ -50,13 +50,13 @@ impl Info {
             ("max_message_bytes", MAX_MESSAGE_BYTES),
             ("max_vector_message_bytes", MAX_VECTOR_MESSAGE_BYTES),
             ("max_vector_streams", MAX_VECTOR_STREAMS),
-            ("max_vector_batch_bytes", MAX_VECTOR_BATCH_BYTES),
-            ("max_vector_seats", MAX_VECTOR_SEATS),
+            ("max_vector_batch_bytes", MAX_BATCH_BYTES),
+            ("max_vector_seats", Limits::OF_SERVER.seats_played as usize),
             ("max_vector_seats_in_all", MAX_VECTOR_SEATS_IN_ALL),
-            ("max_vector_seeds", MAX_VECTOR_SEEDS),
+            ("max_vector_seeds", Limits::OF_SERVER.seeds),
             (
                 "max_vector_recorded_games",
-                MAX_VECTOR_RECORDED_GAMES as usize,
+                Limits::OF_SERVER.recorded_games as usize,
             ),
             (
                 "max_vector_network_multiplications",

@@ -2,6 +2,7 @@
 
 use std::iter::Peekable;
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1::{
@@ -32,12 +33,19 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
 use chefshat_base::tasks::short;
 use chefshat_hosting::config::{
-    IMPORT_IDLE_TIMEOUT, IMPORT_RATE, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES,
-    MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
+    IMPORT_IDLE_TIMEOUT, IMPORT_RATE, MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT,
+    RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use chefshat_hosting::tournaments::Tournaments;
 use chefshat_room::ids::GameId;
 use chefshat_store::{Listed, Part, StoreError};
+
+/// Largest record that may be imported, bytes as encoded.
+const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
+/// Most lines of a record that may be imported.
+const MAX_IMPORT_LINES: usize = 1_500_000;
+/// How long the upload of a record may take.
+const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Most lines in one message, and most bytes unless a single line is longer: well below the limit
 /// of gRPC clients.

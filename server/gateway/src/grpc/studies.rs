@@ -35,7 +35,7 @@ use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_hosting::cluster::FoundBy;
 use chefshat_hosting::config::{
     FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_PEER_MESSAGE_BYTES, MAX_RECORDS_SENT,
-    MAX_STUDY_ADDED, MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
+    MAX_STUDY_STREAMS,
 };
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
@@ -44,6 +44,11 @@ use chefshat_hosting::studies::{
 use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
+
+/// Most participants that one request adds to a study.
+const MAX_STUDY_ADDED: usize = 1_000;
+/// Most participants in one message to a follower of a study.
+const MAX_STUDY_PARTICIPANTS_SENT: usize = 200;
 
 /// Participants of a study about all of whom a request costs its caller one call more.
 const PARTICIPANTS_PER_CALL: usize = 100;

@@ -31,9 +31,7 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
-use chefshat_hosting::config::{
-    MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
-};
+use chefshat_hosting::config::MAX_FOLLOWERS;
 use chefshat_hosting::tournaments::{
     BeginRefusal, ByHand, ByHandRefusal, CreateError, Entry, JoinRefusal, Leaderboard, Newcomer,
     Stopped, TableProblem, TournamentHandle, Tournaments, Who,
@@ -45,6 +43,13 @@ use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
 use chefshat_store::StoreError;
 use chefshat_wire::convert::{self, Mirrored as _};
+
+/// Most updates for followers, and most results, that are computed at a time.
+const MAX_CONCURRENT_RESULTS: usize = 2;
+/// Most games of a tournament in one page.
+const MAX_GAMES_PAGE: u32 = 500;
+/// Most rows of a leaderboard.
+const MAX_LEADERBOARD_LINES: u32 = 1_000;
 
 /// Default page size of games, and default number of rows of a leaderboard.
 const DEFAULT_LINES: u32 = 100;

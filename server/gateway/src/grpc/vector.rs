@@ -34,11 +34,13 @@ use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_base::metrics::{Counted, Metrics, StreamKind};
 use chefshat_base::tasks::short;
 use chefshat_base::threads::{Priority, Threads, caught};
-use chefshat_hosting::config::{
-    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
-    VECTOR_SETUP_TIMEOUT,
-};
+use chefshat_hosting::config::{MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_SETUP_TIMEOUT};
 use chefshat_room::ids::random_bytes;
+
+/// How long a client may think about a batch.
+const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
+/// How long a client may take to receive one message.
+const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Messages queued for a slow client. At most one is a batch; the others are parts of records.
 const SEND_AHEAD: usize = 4;

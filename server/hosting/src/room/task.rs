@@ -46,7 +46,7 @@ use super::subscriber::{MAX_SPECTATORS, PublicEvents, Subscriber};
 use super::table_view::{SentState, TableView};
 use super::telemetry::RoomTelemetry;
 use crate::cluster::{NodeLease, UnitEvent};
-use crate::config::{HINT_TIME, ROOM_MAILBOX};
+use crate::config::ROOM_MAILBOX;
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::webhooks::Webhooks;
@@ -59,6 +59,9 @@ use chefshat_base::metrics::Metrics;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_store::{Journal, Store};
 use chefshat_wire::outbox::{OnSpace, StreamEnd};
+
+/// Time of a hint.
+const HINT_TIME: Duration = Duration::from_millis(400);
 
 /// Most inputs that are applied before one commit.
 const INPUTS_PER_COMMIT: usize = 64;

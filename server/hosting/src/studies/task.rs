@@ -12,7 +12,7 @@ use tracing::{info, warn};
 use super::data::{RETRY_STUDIES, StudyData, memory_of};
 use super::message::{Command, Message, NotDeleted};
 use super::state::{Budgets, StudyShared};
-use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
+use crate::config::MAX_STUDIES;
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
@@ -24,6 +24,9 @@ use chefshat_store::samples::Undeleted;
 use chefshat_store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
 use chefshat_store::units::{StoredUnit, UnitKey, UnitWrite};
 use chefshat_wire::convert::{self, StudyPlan};
+
+/// Messages that may wait for one study.
+const STUDY_MAILBOX: usize = 256;
 
 impl UnitHeader for StudyHeader {
     type Kind = ids::Study;

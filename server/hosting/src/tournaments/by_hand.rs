@@ -8,11 +8,14 @@ use super::handle::TournamentHandle;
 use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Who};
 use super::state::TournamentState;
 use super::task::TournamentTask;
-use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
 use crate::journaled::Stopped;
 use chefshat_admission::limits::Key;
 use chefshat_room::ids::{SecretHash, TournamentToken};
 use chefshat_store::tournaments::TournamentEntry;
+
+/// Most participants of one caller who withdraw from a tournament before it begins, so that nobody
+/// fills its journal by joining and withdrawing.
+pub(super) const MAX_EARLY_WITHDRAWALS_OF_CALLER: u32 = 20;
 
 impl TournamentHandle {
     /// Changes the tournament by hand. Returns the ticket of a new participant who connects.

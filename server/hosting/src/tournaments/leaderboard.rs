@@ -16,9 +16,16 @@ use tokio::sync::Mutex;
 use tokio::time::Instant;
 
 use super::shared::{ComputeError, Shared};
-use crate::config::{LEADERBOARD_AGE, LEADERBOARD_READ_AGAIN, LEADERBOARD_SHARE};
 use crate::rooms::Rooms;
 use chefshat_store::{Listed, Part, Store, StoreError};
+
+/// How old a cached leaderboard may be.
+const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
+/// Time between two readings of all games for the leaderboard: until then it may count games that
+/// were deleted, and show a name that another node deleted.
+const LEADERBOARD_READ_AGAIN: Duration = Duration::from_secs(600);
+/// 1/N of the time may be spent computing the leaderboard.
+const LEADERBOARD_SHARE: u32 = 10;
 
 /// Summaries read at a time.
 const PAGE: usize = 1_000;

@@ -17,6 +17,7 @@ mod tests;
 mod views;
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
@@ -31,7 +32,6 @@ pub use shared::ComputeError;
 
 pub use crate::journaled::Stopped;
 
-use crate::config::MAX_START_AHEAD;
 use crate::journaled::{Folded, New, Registry, owner_of};
 use crate::rooms::{self, CODES_TRIED, Rooms};
 use chefshat_admission::limits::Key;
@@ -42,6 +42,9 @@ use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
 use state::{Common, TournamentShared, TournamentState};
 use task::TournamentTask;
+
+/// How far ahead the start of a tournament may be set.
+const MAX_START_AHEAD: Duration = Duration::from_secs(366 * 24 * 3_600);
 
 /// Why a tournament was not created.
 pub type CreateError = rooms::CreateError<SettingsProblem>;

@@ -11,7 +11,7 @@ use tracing::info;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use super::state::{Common, TournamentShared, TournamentState};
-use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
+use crate::config::MAX_TOURNAMENTS;
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::limits::{Key, Refused};
@@ -23,6 +23,13 @@ use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentH
 use chefshat_store::units::StoredUnit;
 use chefshat_wire::convert::{self, TournamentPlan};
 use chefshat_wire::outbox::StreamEnd;
+
+/// Messages that may wait for one tournament.
+const TOURNAMENT_MAILBOX: usize = 256;
+/// How long a tournament stays open if nobody joins or starts it.
+const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
+/// How long a tournament stays paused.
+pub(super) const TOURNAMENT_PAUSE: Duration = Duration::from_secs(7 * 24 * 3_600);
 
 /// When it is worth trying again to create a tournament.
 const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);

@@ -446,7 +446,7 @@ async fn a_pause_ends_by_itself() {
     assert_eq!(paused, Ok(None));
     let before = Instant::now();
     until(&handle, |core| !core.is_paused()).await;
-    assert!(before.elapsed() >= crate::config::TOURNAMENT_PAUSE);
+    assert!(before.elapsed() >= super::task::TOURNAMENT_PAUSE);
     // Nobody comes, so it ends without results.
     until(&handle, |core| core.state() == State::Finished).await;
 }
@@ -570,7 +570,7 @@ async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
 
 #[tokio::test]
 async fn one_caller_cannot_join_and_withdraw_for_ever() {
-    use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
+    use super::by_hand::MAX_EARLY_WITHDRAWALS_OF_CALLER;
     let tournaments = in_memory();
     let handle = created(&tournaments, &coppa()).await;
     let come = async || joined(&handle, "fickle").await.1;

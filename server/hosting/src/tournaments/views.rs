@@ -11,8 +11,11 @@ use tokio::sync::Semaphore;
 
 use super::handle::TournamentHandle;
 use super::shared::{AsOf, ComputeError, Mark};
-use crate::config::MAX_GAMES_FOLLOWED;
 use chefshat_wire::convert;
+
+/// Most games in an update of a followed tournament. It keeps a message well below the 4 MB that
+/// clients accept by default. At most half as many are played at a time.
+const MAX_GAMES_FOLLOWED: usize = 512;
 
 impl TournamentHandle {
     /// The current update for followers. Computed when a permit is available.

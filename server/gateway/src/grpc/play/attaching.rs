@@ -22,12 +22,15 @@ use crate::grpc::takeover::{is_changing, waits};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Payer;
 use chefshat_base::tasks::short;
-use chefshat_hosting::config::{MAX_COMMANDS_CONTESTED, MAX_SEATS_PER_STREAM};
+use chefshat_hosting::config::MAX_SEATS_PER_STREAM;
 use chefshat_hosting::room::subscriber::DeliveryOptions;
 use chefshat_hosting::room::{AttachRequest, NotAttached, RoomError, RoomGone, Supersedes};
 use chefshat_room::ids::{RoomToken, UnitToken};
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::outbox::StreamEnd;
+
+/// Most commands of a seat that wait for its attachment while another stream has it.
+const MAX_COMMANDS_CONTESTED: usize = 64;
 
 impl Reader {
     /// Attaches the next seat or participant of the client.

@@ -21,7 +21,7 @@ use crate::grpc::forward::Gateway;
 use crate::grpc::refusals::count;
 use crate::grpc::status::{command_missing, field, invalid, refused, room_gone, status};
 use chefshat_admission::access::Caller;
-use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING};
+use chefshat_hosting::config::FIRST_MESSAGE_TIMEOUT;
 use chefshat_hosting::room::{Handle, Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{Call, TournamentHandle, Tournaments};
@@ -30,6 +30,9 @@ use chefshat_room::{Answer, ConnectionId};
 use chefshat_wire::convert;
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::outbox::{HandStamp, Outbox, StreamEnd};
+
+/// Most calls to games that may wait for one stream; a further one ends the stream.
+const MAX_CALLS_WAITING: usize = 4_096;
 
 /// Detached seats that a stream may keep in any case, whose late answers are judged by their room.
 pub(super) const DETACHED_KEPT: usize = 64;

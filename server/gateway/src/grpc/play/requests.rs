@@ -9,11 +9,13 @@ use tonic::{Code, Status};
 
 use super::reader::{Reader, Requests};
 use crate::grpc::status::status;
-use chefshat_hosting::config::MAX_COMMANDS_PER_MESSAGE;
 use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_room::Answer;
 use chefshat_wire::convert;
 use chefshat_wire::encoded::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
+
+/// Most commands in one message.
+const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 
 impl Requests for v1::PlayRequest {
     async fn execute(self, reader: &mut Reader, arrived: Instant) -> Result<(), Status> {

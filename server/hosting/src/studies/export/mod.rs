@@ -18,7 +18,6 @@ use tokio::sync::mpsc;
 use tracing::error;
 
 use super::handle::StudyHandle;
-use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
 use chefshat_room::ids::GameId;
 use chefshat_store::{StoreError, StoredGame};
@@ -26,6 +25,9 @@ use chefshat_wire::convert;
 use columns::{CodebookRow, GameResult, GameRow, GroupRow, ParticipantRow, SessionRow, TraceRow};
 use questionnaires::{AnswerRow, ItemRow};
 use table::{Sheet, Table};
+
+/// Most bytes in one message of the data of a study.
+const STUDY_EXPORT_CHUNK: usize = 64 * 1024;
 
 /// Bytes that most lines of a table do not exceed.
 const LINE: usize = 512;
