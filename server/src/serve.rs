@@ -358,19 +358,19 @@ impl Server {
         } = self;
         let is_node = node.is_some();
         let closing = CancellationToken::new();
-        let spawn = |task, work: BoxFuture<'static, ()>| {
+        let begin = |task, work: BoxFuture<'static, ()>| {
             let until_closing = closing.clone().run_until_cancelled_owned(work);
             tracker.spawn(named(task, until_closing))
         };
-        spawn(
+        begin(
             LongTask::StalledConnections,
             Arc::clone(&connections).close_stalled().boxed(),
         );
         let retention = Retention::new(Arc::clone(&rooms));
         if let Some(keep) = config.keep_games {
-            spawn(LongTask::Retention, retention.clone().follow(keep).boxed());
+            begin(LongTask::Retention, retention.clone().follow(keep).boxed());
         }
-        spawn(
+        begin(
             LongTask::StudyDeletion,
             Arc::clone(&studies).delete_when_due().boxed(),
         );
@@ -396,9 +396,9 @@ impl Server {
             node.as_ref().map(ClusterNode::serves),
             store.metrics().cloned(),
         );
-        let following = spawn(LongTask::Health, following.boxed());
+        let following = begin(LongTask::Health, following.boxed());
 
-        spawn(LongTask::TokenFile, Arc::clone(&access).follow().boxed());
+        begin(LongTask::TokenFile, Arc::clone(&access).follow().boxed());
         let delivering = rooms.webhooks().clone().deliver(closing.clone());
         tracker.spawn(named(LongTask::Webhooks, delivering));
         let encrypted = tls.is_some();
@@ -408,7 +408,7 @@ impl Server {
         let shown: Vec<_> = shown.into_iter().flatten().collect();
         for (_, tls) in &shown {
             let follow = Arc::clone(tls).follow();
-            spawn(LongTask::Certificates, follow.boxed());
+            begin(LongTask::Certificates, follow.boxed());
         }
         scrape::add_certificates(rooms.metrics(), shown);
         let directory = Arc::clone(rooms.directory());
@@ -416,14 +416,14 @@ impl Server {
         if let Some(lease) = rooms.lease() {
             let joining =
                 joining::be_reached(Arc::clone(lease), Arc::clone(&directory), to_others.clone());
-            spawn(LongTask::Joining, joining.boxed());
+            begin(LongTask::Joining, joining.boxed());
         }
         if let Some(peers) = to_others.clone() {
             let signing_key = rooms.signing_key();
             let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
             let metrics = Arc::clone(rooms.metrics());
             let probing = probing::probe(Arc::clone(&directory), peers, signing_key, metrics);
-            spawn(LongTask::Probing, probing.boxed());
+            begin(LongTask::Probing, probing.boxed());
         }
         let forwarding = to_others.clone().map(|to_others| {
             grpc::ForwardLayer::new(Arc::clone(&directory), to_others, Arc::clone(&calls))
