@@ -359,7 +359,7 @@ impl Server {
             node.as_ref().map(ClusterNode::serves),
             self.store.metrics().cloned(),
         );
-        let following = self.spawn(&ending.closing, LongTask::Health, following);
+        let following = self.begin(&ending.closing, LongTask::Health, following);
         let peers = self.peers.take().zip(to_others.clone());
         let peer_serving = match peers {
             None => Either::Left(std::future::ready(Ok(()))),
@@ -389,8 +389,8 @@ impl Server {
         Ok(())
     }
 
-    /// Spawns a task that ends when the server closes its connections.
-    fn spawn(
+    /// Begins a task that ends when the server closes its connections.
+    fn begin(
         &self,
         closing: &CancellationToken,
         task: LongTask,
@@ -410,14 +410,14 @@ impl Server {
     ) {
         let (rooms, directory) = (&self.rooms, self.rooms.directory());
         let stalled = Arc::clone(&self.connections).close_stalled();
-        self.spawn(closing, LongTask::StalledConnections, stalled);
+        self.begin(closing, LongTask::StalledConnections, stalled);
         if let Some(keep) = self.config.keep_games {
-            self.spawn(closing, LongTask::Retention, retention.follow(keep));
+            self.begin(closing, LongTask::Retention, retention.follow(keep));
         }
         let deletion = Arc::clone(&self.studies).delete_when_due();
-        self.spawn(closing, LongTask::StudyDeletion, deletion);
+        self.begin(closing, LongTask::StudyDeletion, deletion);
         let tokens = Arc::clone(&self.access).follow();
-        self.spawn(closing, LongTask::TokenFile, tokens);
+        self.begin(closing, LongTask::TokenFile, tokens);
         let delivering = rooms.webhooks().clone().deliver(closing.clone());
         self.tracker.spawn(named(LongTask::Webhooks, delivering));
         let of_nodes = self.peers.as_ref().and_then(PeerPort::tls);
@@ -427,20 +427,20 @@ impl Server {
             .filter_map(|(whom, tls)| Some((whom, tls?)));
         let shown: Vec<_> = shown.collect();
         for (_, tls) in &shown {
-            self.spawn(closing, LongTask::Certificates, Arc::clone(tls).follow());
+            self.begin(closing, LongTask::Certificates, Arc::clone(tls).follow());
         }
         scrape::add_certificates(rooms.metrics(), shown);
         if let Some(lease) = rooms.lease() {
             let (lease, directory) = (Arc::clone(lease), Arc::clone(directory));
             let joining = joining::be_reached(lease, directory, to_others.cloned());
-            self.spawn(closing, LongTask::Joining, joining);
+            self.begin(closing, LongTask::Joining, joining);
         }
         if let Some(peers) = to_others.cloned() {
             let signing_key = rooms.signing_key();
             let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
             let metrics = Arc::clone(rooms.metrics());
             let probing = probing::probe(Arc::clone(directory), peers, signing_key, metrics);
-            self.spawn(closing, LongTask::Probing, probing);
+            self.begin(closing, LongTask::Probing, probing);
         }
     }
 

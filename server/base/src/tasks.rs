@@ -226,13 +226,7 @@ mod tests {
     use std::path::{Path, PathBuf};
 
     /// How a call that spawns a task begins. The task has a name, or is said to end by itself.
-    const NAMED: [&str; 5] = [
-        "named(",
-        "short(",
-        "tasks::named(",
-        "until_closing(",
-        "running)",
-    ];
+    const NAMED: [&str; 4] = ["named(", "short(", "tasks::named(", "running)"];
     /// The other calls, by file, and why they need no name.
     const OTHERS: [(&str, &str, &str); 3] = [
         (
