@@ -4,7 +4,7 @@ use chefshat_proto::v1;
 use chefshat_study::{Added, Answers, Change};
 use prost::Message;
 
-use super::{Unreadable, array};
+use super::{Unreadable, array, read_messages};
 use crate::Store;
 use crate::error::StoreError;
 use crate::studies::{StoredStudy, StudyHeader};
@@ -118,15 +118,12 @@ fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
 ///
 /// # Errors
 /// An invalid change.
-fn study_changes_from_bytes(mut bytes: &[u8]) -> Result<Vec<Change>, Unreadable> {
-    let mut changes = Vec::new();
-    while !bytes.is_empty() {
-        let form = ChangeForm::decode_length_delimited(&mut bytes)?;
+fn study_changes_from_bytes(bytes: &[u8]) -> Result<Vec<Change>, Unreadable> {
+    read_messages(bytes, |form: ChangeForm| {
         let change = (form.kind).ok_or_else(|| Unreadable::new("a change is empty"))?;
         check(&change)?;
-        changes.push(change);
-    }
-    Ok(changes)
+        Ok(change)
+    })
 }
 
 impl StoredStudy {
@@ -189,8 +186,20 @@ fn check(change: &Change) -> Result<(), Unreadable> {
         Change::Saved(it) => have_values(&it.answers),
         Change::Placed(it) => match it.game() {
             Ok(_) => Ok(()),
-            Err(_) => Err(Unreadable::new("the id of a room or game has not 16 bytes")),
+            Err(_) => Err(Unreadable::new(
+                "the id of a room or game does not have 16 bytes",
+            )),
         },
-        _ => Ok(()),
+        Change::Added(_)
+        | Change::Opened(_)
+        | Change::GameEnded(_)
+        | Change::Continued(_)
+        | Change::DroppedOut(_)
+        | Change::Withdrew(_)
+        | Change::Removed(_)
+        | Change::Closed(_)
+        | Change::ScreenedOut(_)
+        | Change::Grouped(_)
+        | Change::LeftOver(_) => Ok(()),
     }
 }
