@@ -6,7 +6,8 @@ use chefshat_study::{
 };
 
 use super::*;
-use crate::studies::{StudyHeader, changes_to_bytes};
+use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};
+use crate::units::StoredUnit;
 
 fn header(study: u8) -> Arc<StudyHeader> {
     Arc::new(StudyHeader {
@@ -228,4 +229,49 @@ async fn stored_studies_are_read_back_and_forget_participants() {
         assert_eq!((stored.changes, stored.rows), (vec![added(1)], 1));
     })
     .await;
+}
+
+#[test]
+fn changes_that_are_not_whole_are_not_read() {
+    let joined = Added {
+        number: 1,
+        joined: Some(Joined {
+            request_sha256: vec![6; 31],
+            panel_id: String::new(),
+        }),
+        ..Added::default()
+    };
+    let consented = Consented {
+        text_sha256: vec![7; 33],
+        ..Consented::default()
+    };
+    let answers = Answers::from(vec![ItemAnswer::default()]);
+    let answered = Answered {
+        answers: answers.clone(),
+        ..Answered::default()
+    };
+    let saved = Saved { number: 1, answers };
+    let written = |change| changes_to_bytes(&[change]);
+    for (row, problem) in [
+        (
+            written(Change::Added(joined)),
+            "the hash of a request id has 31 bytes, not 32",
+        ),
+        (
+            written(Change::Consented(consented)),
+            "the hash of a consent has 33 bytes, not 32",
+        ),
+        (written(Change::Answered(answered)), "an answer is empty"),
+        (written(Change::Saved(saved)), "an answer is empty"),
+        (
+            written(Change::Placed(Placed::default())),
+            "the id of a room or game does not have 16 bytes",
+        ),
+        // Of a kind with the number 16.
+        (vec![3, 0x82, 1, 0], "a change is empty"),
+    ] {
+        let stored = StoredUnit::new(header(1).to_bytes(), vec![row]);
+        let error = StoredStudy::decode(header(1).id, &stored).expect_err(problem);
+        assert!(error.to_string().ends_with(problem), "{error}");
+    }
 }
