@@ -7,7 +7,9 @@ use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
 use crate::Study;
-use crate::change::{Change, ConsentGiven, Joined};
+use crate::change::{
+    Added, Answered, Change, Consented, Continued, Ended, Joined, Opened, Saved, Withdrew,
+};
 use crate::device::{Device, Pointer, RequiredDevice};
 use crate::games::Phase;
 use crate::questionnaire::{AnswerProblem, ItemAnswer};
@@ -176,13 +178,13 @@ impl Study {
                     .find(|name| taken.insert(name.to_lowercase()))
                     .expect("there are more numbers than participants");
             }
-            changes.push(Change::Added {
+            changes.push(Change::Added(Added {
                 number,
                 pseudonym,
                 joined: None,
                 test,
                 planned: together.then(|| number - (number - first) % size),
-            });
+            }));
         }
         Ok(changes)
     }
@@ -202,8 +204,8 @@ impl Study {
         let mut others = self.participants().values().filter(|it| it.planned == plan);
         let is_formed = others.any(|it| it.group.is_some());
         for change in &mut changes {
-            if let Change::Added { planned, .. } = change {
-                *planned = plan.filter(|_| !is_formed);
+            if let Change::Added(added) = change {
+                added.planned = plan.filter(|_| !is_formed);
             }
         }
         Ok(changes)
@@ -215,7 +217,7 @@ impl Study {
     }
 
     /// The participant who joined by the open link with the request of this hash.
-    pub fn joined_by(&self, request_sha256: &[u8; 32]) -> Option<u32> {
+    pub fn joined_by(&self, request_sha256: &[u8]) -> Option<u32> {
         let is_by = |joined: &Joined| joined.request_sha256 == *request_sha256;
         let mut participants = self.participants().iter();
         participants
@@ -258,8 +260,8 @@ impl Study {
             return Err(Refusal::Full);
         }
         self.check_device(device, false)?;
-        if let Some(Change::Added { joined: how, .. }) = &mut change {
-            *how = Some(joined);
+        if let Some(Change::Added(added)) = &mut change {
+            added.joined = Some(joined);
         }
         Ok((self.next_number(), change))
     }
@@ -302,12 +304,12 @@ impl Study {
         if participant.session >= MAX_SESSIONS {
             return Err(Refusal::TooManySessions);
         }
-        Ok(Some(Change::Opened {
+        Ok(Some(Change::Opened(Opened {
             number,
             slot,
             at_ms: now_ms,
             device,
-        }))
+        })))
     }
 
     /// Refuses a device on which nobody may take part. A test participant may be a program, without one.
@@ -339,16 +341,14 @@ impl Study {
             None if self.settings().groups.is_some() => None,
             None => self.free_slot(participant.test),
         };
-        Ok(Change::Consented {
+        Ok(Change::Consented(Consented {
             number: at.number,
+            text_sha256: Sha256::digest(&consent.text).to_vec(),
+            version: consent.version.clone(),
+            language: self.settings().language.code().to_owned(),
+            at_ms: now_ms,
             slot,
-            consent: ConsentGiven {
-                text_sha256: Sha256::digest(&consent.text).into(),
-                version: consent.version.clone(),
-                language: self.settings().language.code().to_owned(),
-                at_ms: now_ms,
-            },
-        })
+        }))
     }
 
     /// The change by which a participant answers a questionnaire.
@@ -358,12 +358,12 @@ impl Study {
     /// answers are invalid.
     pub fn answer(&self, at: At, answers: Vec<ItemAnswer>, now_ms: u64) -> Result<Change, Refusal> {
         let participant = self.check_answers(at, &answers, false)?;
-        Ok(Change::Answered {
+        Ok(Change::Answered(Answered {
             number: at.number,
             passed_over: self.passed_over_next(participant, Some(&answers)),
             answers: answers.into(),
             at_ms: now_ms,
-        })
+        }))
     }
 
     /// The change by which what a participant has entered so far is saved.
@@ -375,10 +375,10 @@ impl Study {
         if participant.saves >= MAX_SAVES {
             return Err(Refusal::TooManySaves);
         }
-        Ok(Change::Saved {
+        Ok(Change::Saved(Saved {
             number: at.number,
             answers: answers.into(),
-        })
+        }))
     }
 
     fn check_answers(
@@ -421,7 +421,7 @@ impl Study {
             return Err(Refusal::GameNotOver);
         }
         let step_over = participant.games_done() + 1 >= count;
-        Ok(Change::Continued {
+        Ok(Change::Continued(Continued {
             number: at.number,
             step_over,
             passed_over: match step_over {
@@ -429,7 +429,7 @@ impl Study {
                 false => 0,
             },
             at_ms: now_ms,
-        })
+        }))
     }
 
     /// The change that ends the participation of somebody who has come to a step that screens it out;
@@ -438,10 +438,10 @@ impl Study {
         let participant = self.participant(number);
         let active = participant.filter(|it| it.status == Status::Active)?;
         let is_out = matches!(self.step_of(active)?.task, Task::ScreenOut(_));
-        is_out.then_some(Change::ScreenedOut {
+        is_out.then_some(Change::ScreenedOut(Ended {
             number,
             at_ms: now_ms,
-        })
+        }))
     }
 
     /// The change by which a participant withdraws; `None` if it has, and no more data are to be
@@ -458,11 +458,11 @@ impl Study {
         let participant = self.known(number)?;
         let deletes = delete_data && !participant.data_deleted;
         let ends = participant.ends_by_withdrawing(delete_data);
-        Ok((ends || deletes).then_some(Change::Withdrew {
+        Ok((ends || deletes).then_some(Change::Withdrew(Withdrew {
             number,
             delete_data,
             at_ms: now_ms,
-        }))
+        })))
     }
 
     /// The change that removes a participant; `None` if it was removed before.
@@ -474,16 +474,16 @@ impl Study {
         match participant.status {
             Status::Removed => Ok(None),
             Status::Withdrawn => Err(Refusal::Over),
-            _ => Ok(Some(Change::Removed {
+            _ => Ok(Some(Change::Removed(Ended {
                 number,
                 at_ms: now_ms,
-            })),
+            }))),
         }
     }
 
     /// The change that closes the study; `None` if it is closed.
     pub fn close(&self) -> Option<Change> {
-        (!self.is_closed()).then_some(Change::Closed)
+        (!self.is_closed()).then_some(Change::Closed(true))
     }
 
     fn known(&self, number: u32) -> Result<&Participant, Refusal> {

@@ -2,44 +2,56 @@
 
 use crate::checks::{Checked, refuse, within};
 
+/// Largest width and height, in CSS pixels, and most pixels in a hundred of them.
+const MAX_LENGTH: u32 = 65_535;
 /// Longest name of a time zone, in characters.
 const MAX_TIME_ZONE: usize = 64;
 /// The largest width that a page may need, in CSS pixels.
 const MAX_NEEDED_WIDTH: u16 = 3840;
 
-/// A device.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A device, in the form in which it is stored.
+#[derive(Clone, PartialEq, Eq, prost::Message)]
 pub struct Device {
-    /// Width of the page, in CSS pixels, from 1.
-    pub width: u16,
-    /// Height of the page, in CSS pixels, from 1.
-    pub height: u16,
-    /// Pixels of the display in a hundred CSS pixels, from 1.
-    pub pixels: u16,
-    /// Its most exact pointer; `None` if it is not known.
-    pub pointer: Option<Pointer>,
+    /// Width of the page, in CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "1")]
+    pub width: u32,
+    /// Height of the page, in CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "2")]
+    pub height: u32,
+    /// Pixels of the display in a hundred CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "3")]
+    pub pixels: u32,
+    /// Number of its most exact [`Pointer`]; 0 if it is not known.
+    #[prost(uint32, tag = "4")]
+    pub pointer: u32,
     /// Its time zone, 1..=64 letters, digits, `_`, `-`, `+` or `/`.
+    #[prost(string, tag = "5")]
     pub time_zone: String,
 }
 
-/// A pointer, as the media features of CSS have it.
+/// A pointer, as the media features of CSS have it, by its number in stored devices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pointer {
     /// There is none.
-    None,
+    None = 1,
     /// Such as a finger.
-    Coarse,
+    Coarse = 2,
     /// Such as a mouse.
-    Fine,
+    Fine = 3,
 }
 
 impl Device {
+    /// Its most exact pointer; `None` if it is not known.
+    pub fn pointer(&self) -> Option<Pointer> {
+        let mut pointers = [Pointer::None, Pointer::Coarse, Pointer::Fine].into_iter();
+        pointers.find(|it| *it as u32 == self.pointer)
+    }
+
     /// Whether everything is within its range.
     pub fn is_valid(&self) -> bool {
         let is_letter = |byte: u8| byte.is_ascii_alphanumeric() || b"_-+/".contains(&byte);
-        self.width > 0
-            && self.height > 0
-            && self.pixels > 0
+        let lengths = [self.width, self.height, self.pixels];
+        (lengths.iter().all(|it| (1..=MAX_LENGTH).contains(it)))
             && (1..=MAX_TIME_ZONE).contains(&self.time_zone.len())
             && self.time_zone.bytes().all(is_letter)
     }
@@ -74,8 +86,8 @@ impl RequiredDevice {
 
     /// Whether a device is one that is needed. One whose pointer is not known has none.
     pub(crate) fn is_met_by(self, device: &Device) -> bool {
-        let has_pointer = self.pointer.is_none() || self.pointer == device.pointer;
-        has_pointer && device.width >= self.min_width
+        let has_pointer = self.pointer.is_none() || self.pointer == device.pointer();
+        has_pointer && device.width >= self.min_width.into()
     }
 }
 
@@ -89,11 +101,11 @@ mod tests {
         let computer = required(Some(Pointer::Fine), 1024);
         let touch = required(Some(Pointer::Coarse), 0);
         let wide = required(None, 600);
-        let device = |pointer, width| Device {
+        let device = |pointer: Option<Pointer>, width| Device {
             width,
             height: 800,
             pixels: 100,
-            pointer,
+            pointer: pointer.map_or(0, |it| it as u32),
             time_zone: "Europe/Rome".to_owned(),
         };
         for (pointer, width, met_by) in [

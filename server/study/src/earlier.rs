@@ -58,7 +58,7 @@ impl<'a> EarlierAnswers<'a> {
     fn to(&self, questionnaire: &str, item: &str) -> Option<&'a Answer> {
         let (questionnaire, answers) = self.0.get(questionnaire)?;
         let index = questionnaire.items.iter().position(|it| it.id == item)?;
-        let answer = answers.iter().find(|answer| answer.item == index)?;
-        Some(&answer.value)
+        let answer = answers.iter().find(|answer| answer.index() == index)?;
+        answer.value.as_ref()
     }
 }

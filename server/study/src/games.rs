@@ -1,7 +1,7 @@
 //! The games of participants: which one comes next, with which condition, seed and seat. Rooms
 //! belong to the server.
 
-use crate::change::{Change, Outcome, PlacedGame};
+use crate::change::{Change, GameEnded, Outcome, Placed, PlacedGame};
 use crate::stage::Task;
 use crate::state::{Participant, PlayedGame, Status};
 use crate::{Settings, Study};
@@ -192,7 +192,7 @@ impl Study {
             room,
             game,
         };
-        Some(Change::Placed { number, game })
+        Some(Change::Placed(Placed::new(number, &game)))
     }
 
     /// The change by which a participant's game ends; `None` if it is not its running game.
@@ -205,10 +205,10 @@ impl Study {
     ) -> Option<Change> {
         let last = self.participant(number)?.games.last()?;
         let is_running = last.placed.game == game && last.ended.is_none();
-        is_running.then_some(Change::GameEnded {
+        is_running.then_some(Change::GameEnded(GameEnded {
             number,
-            outcome,
             at_ms: now_ms,
-        })
+            finished: outcome == Outcome::Finished,
+        }))
     }
 }

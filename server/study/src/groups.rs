@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Study;
-use crate::change::{Change, PlacedGame};
+use crate::change::{Change, Ended, Grouped, PlacedGame};
 use crate::settings::{Groups, LeftOverPolicy};
 use crate::stage::{Arrival, Task};
 use crate::state::{Participant, Status};
@@ -180,13 +180,13 @@ impl Study {
         let group = last.map_or(0, |(group, _)| *group) + 1;
         let grouped = (slot..).zip(numbers).filter_map(|(slot, number)| {
             let participant = self.participant(*number)?;
-            Some(Change::Grouped {
+            Some(Change::Grouped(Grouped {
                 number: *number,
                 group,
                 slot,
                 passed_over: self.passed_over_next(participant, None),
                 at_ms: now_ms,
-            })
+            }))
         });
         grouped.collect()
     }
@@ -269,14 +269,11 @@ impl Study {
 }
 
 fn left_over(numbers: &[u32], at_ms: u64) -> Vec<Change> {
-    let left_over = |number: &u32| Change::LeftOver {
-        number: *number,
-        at_ms,
-    };
-    numbers.iter().map(left_over).collect()
+    let ended = numbers.iter().map(|&number| Ended { number, at_ms });
+    ended.map(Change::LeftOver).collect()
 }
 
 fn dropped_out(numbers: Vec<u32>, at_ms: u64) -> Vec<Change> {
-    let dropped_out = |number| Change::DroppedOut { number, at_ms };
-    numbers.into_iter().map(dropped_out).collect()
+    let ended = numbers.into_iter().map(|number| Ended { number, at_ms });
+    ended.map(Change::DroppedOut).collect()
 }

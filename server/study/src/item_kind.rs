@@ -71,15 +71,40 @@ pub enum ItemKind {
     },
 }
 
-/// The value of an answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// The value of an answer, in the form in which it is stored.
+#[derive(Clone, PartialEq, Eq, prost::Oneof)]
 pub enum Answer {
     /// A point, from 1, the value of a slider, or a number.
+    #[prost(sint32, tag = "2")]
     Number(i32),
-    /// Indices of the chosen options, ascending.
-    Options(Vec<usize>),
+    /// The chosen options.
+    #[prost(message, tag = "3")]
+    Options(Chosen),
     /// A free text.
+    #[prost(string, tag = "4")]
     Text(String),
+}
+
+/// Chosen options.
+#[derive(Clone, PartialEq, Eq, prost::Message)]
+pub struct Chosen {
+    /// Their indices, ascending.
+    #[prost(uint32, repeated, tag = "1")]
+    pub options: Vec<u32>,
+}
+
+impl Answer {
+    /// Options by their indices, ascending.
+    pub fn options(options: Vec<u32>) -> Self {
+        Self::Options(Chosen { options })
+    }
+}
+
+impl Chosen {
+    /// Their indices, ascending.
+    pub fn indices(&self) -> impl Iterator<Item = usize> {
+        self.options.iter().map(|index| *index as usize)
+    }
 }
 
 /// Some of the answers to an item.
@@ -187,18 +212,18 @@ impl ItemKind {
                 (!is_valid).then(|| format!("{number} is not within {min}..={max}"))
             }
             (Self::Choice { options, multiple }, Answer::Options(chosen)) => {
-                let distinct: BTreeSet<_> = chosen.iter().collect();
+                let count = chosen.options.len();
+                let distinct: BTreeSet<_> = chosen.indices().collect();
                 let (least, most) = match multiple {
                     true => (usize::from(required), options.len()),
                     false => (1, 1),
                 };
-                if !(least..=most).contains(&chosen.len()) {
-                    let count = chosen.len();
+                if !(least..=most).contains(&count) {
                     return Some(format!("{count} options are not within {least}..={most}"));
                 }
-                let is_valid = distinct.len() == chosen.len()
-                    && chosen.is_sorted()
-                    && chosen.iter().all(|option| *option < options.len());
+                let is_valid = distinct.len() == count
+                    && chosen.options.is_sorted()
+                    && chosen.indices().all(|option| option < options.len());
                 let most = options.len() - 1;
                 (!is_valid).then(|| format!("options must ascend within 0..={most}"))
             }
@@ -271,7 +296,9 @@ impl AnswerSet {
     pub fn has(&self, answer: &Answer) -> bool {
         match answer {
             Answer::Number(number) => self.is_within(*number),
-            Answer::Options(chosen) => chosen.iter().any(|option| self.options.contains(option)),
+            Answer::Options(chosen) => {
+                (chosen.indices()).any(|option| self.options.contains(&option))
+            }
             Answer::Text(_) => false,
         }
     }
@@ -281,7 +308,7 @@ impl AnswerSet {
     pub fn is_passed_by(&self, answer: &Answer) -> bool {
         match answer {
             Answer::Number(number) => self.is_within(*number),
-            Answer::Options(chosen) => *chosen == self.options,
+            Answer::Options(chosen) => chosen.indices().eq(self.options.iter().copied()),
             Answer::Text(_) => false,
         }
     }

@@ -59,16 +59,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 pub use assignment::Order;
-pub use change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
+pub use change::{
+    Added, Answered, Change, Consented, Continued, Ended, GameEnded, Grouped, Joined, Opened,
+    Outcome, Placed, PlacedGame, Saved, Withdrew,
+};
 pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SAVES, MAX_SESSIONS, NewParticipants, Refusal};
 pub use device::{Device, DeviceSession, Pointer, RequiredDevice};
 pub use games::{DueGame, MAX_ATTEMPTS};
-pub use item_kind::{Answer, AnswerSet, ItemKind, MAX_OPTIONS};
+pub use item_kind::{Answer, AnswerSet, Chosen, ItemKind, MAX_OPTIONS};
 pub use link::{ParticipantLink, SessionSecret};
 pub use picture::{Picture, PictureFormat};
 pub use questionnaire::{
-    AnswerProblem, Item, ItemAnswer, MAX_ITEMS, MAX_SHOWN_IF, Questionnaire, ShownIf, ShownItemIf,
+    AnswerProblem, Answers, Item, ItemAnswer, MAX_ITEMS, MAX_SHOWN_IF, Questionnaire, ShownIf,
+    ShownItemIf,
 };
 pub use recruiting::Recruiting;
 pub use settings::{
@@ -140,12 +144,10 @@ impl Study {
     /// Applies a change. Does not check that the change follows; one that does not fit has no
     /// effect.
     pub fn fold(&mut self, change: &Change) {
-        if let Change::Added {
-            number, pseudonym, ..
-        } = change
-            && !pseudonym.is_empty()
+        if let Change::Added(added) = change
+            && !added.pseudonym.is_empty()
         {
-            self.recorded.insert(*number);
+            self.recorded.insert(added.number);
         }
         self.state.apply(change);
     }
@@ -213,7 +215,7 @@ impl Study {
             return Some(Vec::new());
         }
         let entered = match participant.answers.get(&step) {
-            Some(answers) => answers,
+            Some(answers) => &answers[..],
             None if step == participant.step() => &participant.saved_answers,
             None => &[][..],
         };
@@ -239,7 +241,7 @@ impl Study {
             });
         answered.flat_map(|(step, it, answers)| {
             let answers = answers.iter();
-            answers.map(move |answer| (step, it, it.items.get(answer.item), answer))
+            answers.map(move |answer| (step, it, it.items.get(answer.index()), answer))
         })
     }
 
@@ -248,7 +250,7 @@ impl Study {
         let answered = self.answered_items(participant);
         let checks = answered.filter_map(|(.., item, answer)| {
             let passing = item?.attention_check.as_ref()?;
-            Some(passing.is_passed_by(&answer.value))
+            Some(passing.is_passed_by(answer.value.as_ref()?))
         });
         checks.fold((0, 0), |(answered, passed), has_passed| {
             (answered + 1, passed + usize::from(has_passed))
@@ -321,7 +323,7 @@ impl Study {
         } else {
             let since_ms = *self.past_date_since_ms.get_or_insert(elapsed_ms);
             if elapsed_ms.saturating_sub(since_ms) >= CONFIRMATION_TIME_MS {
-                return vec![Change::Closed];
+                return vec![Change::Closed(true)];
             }
         }
         let grouped = self.next_of_groups(now_ms, elapsed_ms);
@@ -333,9 +335,11 @@ impl Study {
         let active = active.map(|(number, _)| *number);
         let limit_ms = self.settings.drop_out_after_ms;
         let number = self.presence.drop_out(active, limit_ms, elapsed_ms);
-        let dropped_out = number.map(|number| Change::DroppedOut {
-            number,
-            at_ms: now_ms,
+        let dropped_out = number.map(|number| {
+            Change::DroppedOut(Ended {
+                number,
+                at_ms: now_ms,
+            })
         });
         Vec::from_iter(dropped_out)
     }

@@ -2,7 +2,11 @@
 //! what it must answer.
 
 use std::collections::BTreeSet;
+use std::ops::{Deref, DerefMut};
+use std::slice;
+use std::sync::Arc;
 
+use prost::Message;
 use thiserror::Error;
 
 use crate::chance::Chance;
@@ -77,27 +81,68 @@ pub struct ShownItemIf {
     pub not: bool,
 }
 
-/// An answer to an item.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// An answer to an item, in the form in which it is stored.
+#[derive(Clone, PartialEq, Eq, Message)]
 pub struct ItemAnswer {
     /// Index of the item in the questionnaire's definition.
-    pub item: usize,
-    /// The answer.
-    pub value: Answer,
+    #[prost(uint32, tag = "1")]
+    pub item: u32,
+    /// The answer; always there.
+    #[prost(oneof = "Answer", tags = "2, 3, 4")]
+    pub value: Option<Answer>,
     /// Milliseconds from showing the questionnaire to the last change of this answer, measured by
     /// the participant's device.
+    #[prost(uint32, optional, tag = "5")]
     pub answered_after_ms: Option<u32>,
 }
 
 impl ItemAnswer {
+    /// Index of the item in the questionnaire's definition.
+    pub fn index(&self) -> usize {
+        self.item as usize
+    }
+
     /// Bytes that it takes in memory.
     pub fn memory(&self) -> usize {
         let content = match &self.value {
-            Answer::Number(_) => 0,
-            Answer::Options(chosen) => chosen.capacity() * size_of::<usize>(),
-            Answer::Text(text) => text.capacity(),
+            Some(Answer::Options(chosen)) => chosen.options.capacity() * size_of::<u32>(),
+            Some(Answer::Text(text)) => text.capacity(),
+            Some(Answer::Number(_)) | None => 0,
         };
         size_of::<Self>() + content
+    }
+}
+
+/// Answers to a questionnaire. They may be long, so copies share them until one is changed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Answers(Arc<Vec<ItemAnswer>>);
+
+impl From<Vec<ItemAnswer>> for Answers {
+    fn from(answers: Vec<ItemAnswer>) -> Self {
+        Self(Arc::new(answers))
+    }
+}
+
+impl Deref for Answers {
+    type Target = Vec<ItemAnswer>;
+
+    fn deref(&self) -> &Vec<ItemAnswer> {
+        &self.0
+    }
+}
+
+impl DerefMut for Answers {
+    fn deref_mut(&mut self) -> &mut Vec<ItemAnswer> {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+impl<'a> IntoIterator for &'a Answers {
+    type Item = &'a ItemAnswer;
+    type IntoIter = slice::Iter<'a, ItemAnswer>;
+
+    fn into_iter(self) -> slice::Iter<'a, ItemAnswer> {
+        self.iter()
     }
 }
 
@@ -146,14 +191,18 @@ impl Questionnaire {
         let is_required = |item: &Item| item.required && !only_saved;
         let mut answered = BTreeSet::new();
         for answer in answers {
-            if !answered.insert(answer.item) {
-                return problem(answer.item, "it has two answers".to_owned());
+            let index = answer.index();
+            if !answered.insert(index) {
+                return problem(index, "it has two answers".to_owned());
             }
-            let Some(item) = self.items.get(answer.item) else {
-                return problem(answer.item, "the questionnaire has no such item".to_owned());
+            let Some(item) = self.items.get(index) else {
+                return problem(index, "the questionnaire has no such item".to_owned());
             };
-            if let Some(wrong) = item.kind.problem_of(&answer.value, is_required(item)) {
-                return problem(answer.item, wrong);
+            let Some(value) = &answer.value else {
+                return problem(index, "its answer is empty".to_owned());
+            };
+            if let Some(wrong) = item.kind.problem_of(value, is_required(item)) {
+                return problem(index, wrong);
             }
         }
         let shown = self.shown_by(items, answers);
@@ -256,9 +305,9 @@ impl Questionnaire {
         for &index in items {
             let mut conditions = self.own_conditions(&self.items[index]);
             let is_shown = conditions.all(|(other, condition)| {
-                let answer = answers.iter().find(|answer| answer.item == other);
+                let answer = answers.iter().find(|answer| answer.index() == other);
                 let answer = answer.filter(|_| shown.contains(&other));
-                condition.holds(answer.map(|answer| &answer.value))
+                condition.holds(answer.and_then(|answer| answer.value.as_ref()))
             });
             if is_shown {
                 shown.insert(index);

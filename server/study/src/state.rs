@@ -3,11 +3,10 @@
 //! changes always lead to the same state.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
-use crate::change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
-use crate::device::{Device, DeviceSession};
-use crate::questionnaire::ItemAnswer;
+use crate::change::{Change, Consented, Ended, Joined, Opened, Outcome, PlacedGame, Withdrew};
+use crate::device::DeviceSession;
+use crate::questionnaire::Answers;
 
 /// The state of a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,11 +60,11 @@ pub struct Participant {
     /// When it completed the study or left it, in milliseconds since the Unix epoch.
     pub ended_at_ms: Option<u64>,
     /// Its consent.
-    pub consent: Option<ConsentGiven>,
-    /// Its answers, by step. They may be long, so copies share them.
-    pub answers: BTreeMap<usize, Arc<[ItemAnswer]>>,
+    pub consent: Option<Consented>,
+    /// Its answers, by step.
+    pub answers: BTreeMap<usize, Answers>,
     /// What it has entered in the questionnaire of its step so far.
-    pub saved_answers: Arc<[ItemAnswer]>,
+    pub saved_answers: Answers,
     /// Number of times that it saved answers.
     pub saves: u32,
     /// Its games, in order.
@@ -131,7 +130,7 @@ impl Participant {
             self.passed_over.insert(self.step());
         }
         self.reached_at_ms.push(at_ms);
-        self.saved_answers = Arc::default();
+        self.saved_answers = Answers::default();
         if self.step() >= steps {
             self.end(Status::Completed, at_ms);
         }
@@ -173,18 +172,12 @@ impl StudyState {
     pub(crate) fn apply(&mut self, change: &Change) {
         let steps = self.steps;
         match change {
-            Change::Added {
-                number,
-                pseudonym,
-                joined,
-                test,
-                planned,
-            } => {
-                let added = || Participant {
-                    pseudonym: pseudonym.clone(),
-                    joined: joined.clone(),
-                    test: *test,
-                    planned: *planned,
+            Change::Added(added) => {
+                let participant = || Participant {
+                    pseudonym: added.pseudonym.clone(),
+                    joined: added.joined.clone(),
+                    test: added.test,
+                    planned: added.planned,
                     status: Status::Invited,
                     slot: None,
                     group: None,
@@ -195,134 +188,104 @@ impl StudyState {
                     ended_at_ms: None,
                     consent: None,
                     answers: BTreeMap::new(),
-                    saved_answers: Arc::default(),
+                    saved_answers: Answers::default(),
                     saves: 0,
                     games: Vec::new(),
                     data_deleted: false,
                 };
-                self.participants.entry(*number).or_insert_with(added);
+                let entry = self.participants.entry(added.number);
+                entry.or_insert_with(participant);
             }
-            Change::Opened {
-                number,
-                slot,
-                at_ms,
-                device,
-            } => self.open(*number, *slot, *at_ms, device.clone()),
-            Change::Consented {
-                number,
-                slot,
-                consent,
-            } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.slot = participant.slot.or(*slot);
-                    participant.consent = Some(consent.clone());
-                    participant.advance(steps, 0, consent.at_ms);
+            Change::Opened(opened) => self.open(opened),
+            Change::Consented(consented) => {
+                if let Some(participant) = self.active(consented.number) {
+                    participant.slot = participant.slot.or(consented.slot);
+                    participant.consent = Some(consented.clone());
+                    participant.advance(steps, 0, consented.at_ms);
                 }
             }
-            Change::Answered {
-                number,
-                answers,
-                passed_over,
-                at_ms,
-            } => {
-                if let Some(participant) = self.active(*number) {
+            Change::Answered(answered) => {
+                if let Some(participant) = self.active(answered.number) {
                     let step = participant.step();
-                    participant.answers.insert(step, Arc::clone(answers));
-                    participant.advance(steps, *passed_over, *at_ms);
+                    participant.answers.insert(step, answered.answers.clone());
+                    participant.advance(steps, answered.passed_over, answered.at_ms);
                 }
             }
-            Change::Saved { number, answers } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.saved_answers = Arc::clone(answers);
+            Change::Saved(saved) => {
+                if let Some(participant) = self.active(saved.number) {
+                    participant.saved_answers = saved.answers.clone();
                     participant.saves += 1;
                 }
             }
-            Change::Placed { number, game } => {
-                if let Some(participant) = self.active(*number) {
+            Change::Placed(placed) => {
+                if let Some(participant) = self.active(placed.number)
+                    && let Ok(placed) = placed.game()
+                {
                     participant.games.push(PlayedGame {
-                        placed: game.clone(),
+                        placed,
                         ended: None,
                         continued: false,
                     });
                 }
             }
-            Change::GameEnded {
-                number,
-                outcome,
-                at_ms,
-            } => {
-                let participant = self.participants.get_mut(number);
+            Change::GameEnded(ended) => {
+                let participant = self.participants.get_mut(&ended.number);
                 let last = participant.and_then(|it| it.games.last_mut());
                 if let Some(game) = last.filter(|game| game.ended.is_none()) {
-                    game.ended = Some((*outcome, *at_ms));
+                    let outcome = match ended.finished {
+                        true => Outcome::Finished,
+                        false => Outcome::Aborted,
+                    };
+                    game.ended = Some((outcome, ended.at_ms));
                 }
             }
-            Change::Continued {
-                number,
-                step_over,
-                passed_over,
-                at_ms,
-            } => {
-                if let Some(participant) = self.active(*number) {
+            Change::Continued(continued) => {
+                if let Some(participant) = self.active(continued.number) {
                     if let Some(game) = participant.games.last_mut() {
                         game.continued = true;
                     }
-                    if *step_over {
-                        participant.advance(steps, *passed_over, *at_ms);
+                    if continued.step_over {
+                        participant.advance(steps, continued.passed_over, continued.at_ms);
                     }
                 }
             }
-            Change::Grouped {
-                number,
-                group,
-                slot,
-                passed_over,
-                at_ms,
-            } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.group = Some(*group);
-                    participant.slot = Some(*slot);
-                    participant.advance(steps, *passed_over, *at_ms);
-                    self.groups.entry(*group).or_default().insert(*number);
+            Change::Grouped(grouped) => {
+                if let Some(participant) = self.active(grouped.number) {
+                    participant.group = Some(grouped.group);
+                    participant.slot = Some(grouped.slot);
+                    participant.advance(steps, grouped.passed_over, grouped.at_ms);
+                    let group = self.groups.entry(grouped.group).or_default();
+                    group.insert(grouped.number);
                 }
             }
-            Change::LeftOver { number, at_ms } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.end(Status::LeftOver, *at_ms);
+            Change::LeftOver(ended) => self.end(ended, Status::LeftOver),
+            Change::DroppedOut(ended) => self.end(ended, Status::DroppedOut),
+            Change::ScreenedOut(ended) => self.end(ended, Status::ScreenedOut),
+            Change::Withdrew(withdrew) => self.withdraw(withdrew),
+            Change::Removed(ended) => {
+                if let Some(participant) = self.participants.get_mut(&ended.number) {
+                    participant.end(Status::Removed, ended.at_ms);
                 }
             }
-            Change::DroppedOut { number, at_ms } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.end(Status::DroppedOut, *at_ms);
-                }
-            }
-            Change::ScreenedOut { number, at_ms } => {
-                if let Some(participant) = self.active(*number) {
-                    participant.end(Status::ScreenedOut, *at_ms);
-                }
-            }
-            Change::Withdrew {
-                number,
-                delete_data,
-                at_ms,
-            } => self.withdraw(*number, *delete_data, *at_ms),
-            Change::Removed { number, at_ms } => {
-                if let Some(participant) = self.participants.get_mut(number) {
-                    participant.end(Status::Removed, *at_ms);
-                }
-            }
-            Change::Closed => self.closed = true,
+            Change::Closed(_) => self.closed = true,
         }
     }
 
-    fn open(&mut self, number: u32, slot: Option<u32>, at_ms: u64, device: Option<Device>) {
-        let Some(participant) = self.participants.get_mut(&number) else {
+    /// Ends the participation of an active participant.
+    fn end(&mut self, ended: &Ended, status: Status) {
+        if let Some(participant) = self.active(ended.number) {
+            participant.end(status, ended.at_ms);
+        }
+    }
+
+    fn open(&mut self, opened: &Opened) {
+        let Some(participant) = self.participants.get_mut(&opened.number) else {
             return;
         };
         match participant.status {
             Status::Invited => {
-                participant.slot = slot;
-                participant.reached_at_ms.push(at_ms);
+                participant.slot = opened.slot;
+                participant.reached_at_ms.push(opened.at_ms);
             }
             Status::Active | Status::DroppedOut => {}
             _ => return,
@@ -330,20 +293,21 @@ impl StudyState {
         participant.status = Status::Active;
         participant.ended_at_ms = None;
         participant.session += 1;
-        if let Some(device) = device {
+        if let Some(device) = opened.device.clone() {
+            let at_ms = opened.at_ms;
             let session = DeviceSession { at_ms, device };
             participant.devices.insert(participant.session, session);
         }
     }
 
-    fn withdraw(&mut self, number: u32, delete_data: bool, at_ms: u64) {
-        let Some(participant) = self.participants.get_mut(&number) else {
+    fn withdraw(&mut self, withdrew: &Withdrew) {
+        let Some(participant) = self.participants.get_mut(&withdrew.number) else {
             return;
         };
-        if participant.ends_by_withdrawing(delete_data) {
-            participant.end(Status::Withdrawn, at_ms);
+        if participant.ends_by_withdrawing(withdrew.delete_data) {
+            participant.end(Status::Withdrawn, withdrew.at_ms);
         }
-        if delete_data {
+        if withdrew.delete_data {
             participant.data_deleted = true;
             participant.pseudonym.clear();
             participant.devices.clear();
@@ -351,7 +315,7 @@ impl StudyState {
                 joined.panel_id.clear();
             }
             participant.answers.clear();
-            participant.saved_answers = Arc::default();
+            participant.saved_answers = Answers::default();
         }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use chefshat_record::pseudonym::Named;
 use chefshat_room::ids::GameId;
-use chefshat_study::{Answer, Change};
+use chefshat_study::{Answer, Change, Withdrew};
 use serde_json::json;
 
 use super::data::{DataError, ParticipantData};
@@ -25,8 +25,8 @@ impl ParticipantData {
             let mut is_playing = false;
             for change in &stored.changes {
                 match change {
-                    Change::Placed { number: of, .. } if *of == number => is_playing = true,
-                    Change::GameEnded { number: of, .. } if *of == number => is_playing = false,
+                    Change::Placed(it) if it.number == number => is_playing = true,
+                    Change::GameEnded(it) if it.number == number => is_playing = false,
                     _ => {}
                 }
             }
@@ -43,11 +43,11 @@ impl ParticipantData {
         for (stored, number) in self.in_studies(who).await? {
             let mut changes = stored.changes;
             let mut games = games_of(&changes, number);
-            changes.push(Change::Withdrew {
+            changes.push(Change::Withdrew(Withdrew {
                 number,
                 delete_data: true,
                 at_ms: since_epoch_ms(),
-            });
+            }));
             for change in &mut changes {
                 change.forget(number);
             }
@@ -94,7 +94,7 @@ impl ParticipantData {
                     "atMs": consent.at_ms,
                     "version": consent.version,
                     "language": consent.language,
-                    "textSha256": hex::encode(consent.text_sha256),
+                    "textSha256": hex::encode(&consent.text_sha256),
                 })
             });
             let devices = participant.devices.iter().map(|(session, opened)| {
@@ -118,11 +118,11 @@ impl ParticipantData {
                 "gameIds": games,
             } })];
             for (step, questionnaire, item, answer) in study.answered_items(participant) {
-                let value = match &answer.value {
+                let value = answer.value.as_ref().map(|value| match value {
                     Answer::Number(number) => json!(number),
-                    Answer::Options(options) => json!(options),
+                    Answer::Options(chosen) => json!(chosen.options),
                     Answer::Text(text) => json!(text),
-                };
+                });
                 lines.push(json!({ "answer": {
                     "step": step,
                     "questionnaire": questionnaire.id,
@@ -176,9 +176,7 @@ impl ParticipantData {
             };
             let Some(stored) = stored else { continue };
             let number = stored.changes.iter().find_map(|change| match change {
-                Change::Added {
-                    number, pseudonym, ..
-                } if who.is(pseudonym, "") => Some(*number),
+                Change::Added(added) if who.is(&added.pseudonym, "") => Some(added.number),
                 _ => None,
             });
             found.extend(number.map(|number| (stored, number)));
@@ -190,7 +188,7 @@ impl ParticipantData {
 /// The games of a participant.
 fn games_of(changes: &[Change], wanted: u32) -> Vec<GameId> {
     let games = changes.iter().filter_map(|change| match change {
-        Change::Placed { number, game } if *number == wanted => Some(convert::game_of(game)),
+        Change::Placed(it) if it.number == wanted => Some(convert::game_of(&it.game().ok()?)),
         _ => None,
     });
     games.collect()
@@ -200,6 +198,7 @@ fn games_of(changes: &[Change], wanted: u32) -> Vec<GameId> {
 mod tests {
     use chefshat_proto::v1;
     use chefshat_room::ids::{Id, SecretHash};
+    use chefshat_study::Added;
     use tokio::sync::mpsc;
 
     use super::*;
@@ -220,13 +219,13 @@ mod tests {
         };
         let id = header.id;
         store.create_study(Arc::new(header)).await.expect("stored");
-        let added = Change::Added {
+        let added = Change::Added(Added {
             number: 1,
             pseudonym: "Ada".to_owned(),
             joined: None,
             test: false,
             planned: None,
-        };
+        });
         let appended = store.append_study(id, 0, vec![added]).await;
         appended.expect("stored");
         let data = ParticipantData::new(store, None);

@@ -300,7 +300,7 @@ impl StudyHandle {
             };
             match (memory, &mut change) {
                 (Some(memory), _) => data.keep(number, memory),
-                (None, Change::Opened { device, .. }) => *device = None,
+                (None, Change::Opened(opened)) => opened.device = None,
                 (None, _) => {}
             }
             let before = study.participant(number).map_or(0, |it| it.session);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_study::{Change, Refusal, SettingsProblem, Status, Study};
+use chefshat_study::{Change, Ended, Refusal, SettingsProblem, Status, Study};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 use tracing::{info, warn};
@@ -196,7 +196,7 @@ impl Journaled for StudyTask {
                 let active: Vec<u32> = active.map(|(number, _)| *number).collect();
                 let at_ms = (self.now)();
                 for number in active {
-                    self.fold(Change::Removed { number, at_ms });
+                    self.fold(Change::Removed(Ended { number, at_ms }));
                 }
                 if let Some(change) = self.unit.state.close() {
                     self.fold(change);
@@ -242,9 +242,7 @@ impl Journaled for StudyTask {
     fn announce(&mut self, changes: &[Change]) {
         let numbers: BTreeSet<u32> = changes.iter().filter_map(Change::number).collect();
         // What somebody has entered so far changes nothing for others.
-        let seen = changes
-            .iter()
-            .filter(|it| !matches!(it, Change::Saved { .. }));
+        let seen = changes.iter().filter(|it| !matches!(it, Change::Saved(_)));
         let seen: BTreeSet<u32> = seen.filter_map(Change::number).collect();
         let others = seen.iter();
         let others = others.flat_map(|number| self.unit.state.affected_with(*number));
@@ -463,30 +461,22 @@ impl StudyTask {
             self.touched.extend(self.unit.state.affected_with(number));
         }
         match &change {
-            Change::Placed { number, .. } => {
-                self.playing.insert(*number);
-                self.without_room.insert(*number);
+            Change::Placed(placed) => {
+                self.playing.insert(placed.number);
+                self.without_room.insert(placed.number);
             }
-            Change::GameEnded { number, .. } => {
-                self.playing.remove(number);
-                self.without_room.remove(number);
+            Change::GameEnded(ended) => {
+                self.playing.remove(&ended.number);
+                self.without_room.remove(&ended.number);
             }
-            Change::Opened { number, .. } => {
+            Change::Opened(opened) => {
                 // The stream of the earlier session ends.
-                self.streams.remove(number);
-                self.show_connected(*number, false);
+                self.streams.remove(&opened.number);
+                self.show_connected(opened.number, false);
             }
-            Change::Withdrew {
-                number,
-                delete_data: true,
-                ..
-            } => {
-                self.unit
-                    .handle
-                    .shared
-                    .deleting
-                    .lock()
-                    .insert(*number, false);
+            Change::Withdrew(withdrew) if withdrew.delete_data => {
+                let shared = &self.unit.handle.shared;
+                shared.deleting.lock().insert(withdrew.number, false);
             }
             _ => {}
         }

@@ -692,10 +692,12 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     let added = study.add(Key::Local, named("Bo")).await;
     assert_eq!(added, Ok(4));
     studies.end();
-    let withdrew = |number| chefshat_study::Change::Withdrew {
-        number,
-        delete_data: true,
-        at_ms: 1,
+    let withdrew = |number| {
+        chefshat_study::Change::Withdrew(chefshat_study::Withdrew {
+            number,
+            delete_data: true,
+            at_ms: 1,
+        })
     };
     let appended = lab
         .store
@@ -915,12 +917,12 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     }
     let answer = |item, value| ItemAnswer {
         item,
-        value,
+        value: Some(value),
         answered_after_ms: Some(700),
     };
     let all = vec![
         answer(0, Answer::Number(5)),
-        answer(1, Answer::Options(vec![0, 2])),
+        answer(1, Answer::options(vec![0, 2])),
         answer(2, Answer::Text("=1+2, or \"three\"".into())),
         answer(3, Answer::Number(12)),
         answer(4, Answer::Number(3)),
@@ -1189,7 +1191,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let before = studies.common.data.taken();
     let answer = |item| chefshat_study::ItemAnswer {
         item,
-        value: chefshat_study::Answer::Text("x".repeat(10_000)),
+        value: Some(chefshat_study::Answer::Text("x".repeat(10_000))),
         answered_after_ms: None,
     };
     let answers: Vec<_> = (0..100).map(answer).collect();

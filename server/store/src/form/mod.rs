@@ -1,7 +1,7 @@
 //! The encoding of headers and journals in the database: separate protocol buffers, so that stored
 //! games do not depend on the engine's types or the protocol's messages. Fields are only ever
 //! added. Messages of the protocol that only grow (rule sets, policies, annotations, expressions) are
-//! stored as they are.
+//! stored as they are, and so are the changes of a study, whose core gives their fields their numbers.
 
 mod entry;
 #[cfg(test)]
@@ -14,7 +14,7 @@ mod unit;
 
 use chefshat_engine::ActionId;
 use chefshat_proto::v1;
-use prost::Message as _;
+use prost::Message;
 
 #[cfg(test)]
 pub(super) use entry::put_entry;
@@ -84,12 +84,20 @@ pub(super) fn lines_to_bytes(lines: &[v1::RecordLine]) -> Vec<u8> {
 ///
 /// # Errors
 /// An invalid line.
-pub(super) fn lines_from_bytes(mut bytes: &[u8]) -> Result<Vec<v1::RecordLine>, Unreadable> {
-    let mut lines = Vec::new();
+pub(super) fn lines_from_bytes(bytes: &[u8]) -> Result<Vec<v1::RecordLine>, Unreadable> {
+    read_messages(bytes, Ok)
+}
+
+/// Reads messages that stand one after another, each behind its length.
+fn read_messages<M: Message + Default, T>(
+    mut bytes: &[u8],
+    read: impl Fn(M) -> Result<T, Unreadable>,
+) -> Result<Vec<T>, Unreadable> {
+    let mut values = Vec::new();
     while !bytes.is_empty() {
-        lines.push(v1::RecordLine::decode_length_delimited(&mut bytes)?);
+        values.push(read(M::decode_length_delimited(&mut bytes)?)?);
     }
-    Ok(lines)
+    Ok(values)
 }
 
 fn action(number: u32) -> Result<ActionId, Unreadable> {

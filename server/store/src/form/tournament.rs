@@ -5,7 +5,7 @@ use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistic
 use prost::Message;
 
 use super::entry::{KINDS, number_of, value_of};
-use super::{Unreadable, array};
+use super::{Unreadable, array, read_messages};
 use crate::error::StoreError;
 use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use crate::units::{StoredUnit, UnitKey};
@@ -254,15 +254,11 @@ impl TournamentEntry {
 /// # Errors
 /// An invalid entry.
 pub(crate) fn tournament_entries_from_bytes(
-    mut bytes: &[u8],
+    bytes: &[u8],
 ) -> Result<Vec<TournamentEntry>, Unreadable> {
-    let mut entries = Vec::new();
-    while !bytes.is_empty() {
-        let form = EntryForm::decode_length_delimited(&mut bytes)?;
-        let kind = (form.kind).ok_or_else(|| Unreadable::new("an entry is empty"))?;
-        entries.push(entry_of(kind)?);
-    }
-    Ok(entries)
+    read_messages(bytes, |form: EntryForm| {
+        entry_of((form.kind).ok_or_else(|| Unreadable::new("an entry is empty"))?)
+    })
 }
 
 impl StoredTournament {

@@ -1,11 +1,13 @@
 //! Stored studies, in each store that has them.
 
 use chefshat_study::{
-    Answer, Change, ConsentGiven, Device, ItemAnswer, Joined, Outcome, PlacedGame, Pointer,
+    Added, Answer, Answered, Answers, Change, Consented, Continued, Device, Ended, GameEnded,
+    Grouped, ItemAnswer, Joined, Opened, Placed, PlacedGame, Pointer, Saved, Withdrew,
 };
 
 use super::*;
-use crate::studies::{StudyHeader, changes_to_bytes};
+use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};
+use crate::units::StoredUnit;
 
 fn header(study: u8) -> Arc<StudyHeader> {
     Arc::new(StudyHeader {
@@ -21,53 +23,59 @@ fn header(study: u8) -> Arc<StudyHeader> {
 }
 
 fn added(number: u32) -> Change {
-    Change::Added {
+    Change::Added(Added {
         number,
         pseudonym: format!("Pseudonym {number}"),
         joined: None,
         test: false,
         planned: None,
-    }
+    })
 }
 
 fn every_change() -> Vec<Change> {
-    let answer = |item: usize, value: Answer, answered_after_ms: Option<u32>| ItemAnswer {
+    let answer = |item: u32, value: Answer, answered_after_ms: Option<u32>| ItemAnswer {
         item,
-        value,
+        value: Some(value),
         answered_after_ms,
     };
-    let game = |seed_index: Option<usize>| PlacedGame {
-        step: 2,
-        condition: 1,
-        practice: seed_index.is_none(),
-        seed_index,
-        seat: 3,
-        attempt: 2,
-        room: [8; 16],
-        game: [9; 16],
-    };
     let (number, at_ms) = (1, 5000);
+    let placed = |seed_index: Option<usize>| {
+        Change::Placed(Placed::new(
+            number,
+            &PlacedGame {
+                step: 2,
+                condition: 1,
+                practice: seed_index.is_none(),
+                seed_index,
+                seat: 3,
+                attempt: 2,
+                room: [8; 16],
+                game: [9; 16],
+            },
+        ))
+    };
+    let ended = Ended { number, at_ms };
     vec![
         added(number),
-        Change::Added {
+        Change::Added(Added {
             number: 2,
             pseudonym: "P02".to_owned(),
             joined: Some(Joined {
-                request_sha256: [6; 32],
+                request_sha256: vec![6; 32],
                 panel_id: "5f2".to_owned(),
             }),
             test: true,
             planned: Some(1),
-        },
-        Change::Grouped {
+        }),
+        Change::Grouped(Grouped {
             number,
             group: 3,
             slot: 7,
             passed_over: 1,
             at_ms,
-        },
-        Change::LeftOver { number, at_ms },
-        Change::Opened {
+        }),
+        Change::LeftOver(ended.clone()),
+        Change::Opened(Opened {
             number,
             slot: Some(0),
             at_ms,
@@ -75,84 +83,76 @@ fn every_change() -> Vec<Change> {
                 width: 390,
                 height: 844,
                 pixels: 300,
-                pointer: Some(Pointer::Coarse),
+                pointer: Pointer::Coarse as u32,
                 time_zone: "Europe/Rome".to_owned(),
             }),
-        },
-        Change::Opened {
+        }),
+        Change::Opened(Opened {
             number,
             slot: None,
             at_ms,
             device: None,
-        },
-        Change::Consented {
+        }),
+        Change::Consented(Consented {
             number,
+            text_sha256: vec![7; 32],
+            version: "2".to_owned(),
+            language: "it".to_owned(),
+            at_ms,
             slot: None,
-            consent: ConsentGiven {
-                text_sha256: [7; 32],
-                version: "2".to_owned(),
-                language: "it".to_owned(),
-                at_ms,
-            },
-        },
-        Change::Answered {
+        }),
+        Change::Answered(Answered {
             number,
-            answers: Arc::new([
+            answers: Answers::from(vec![
                 answer(0, Answer::Number(-3), Some(0)),
-                answer(1, Answer::Options(vec![0, 4]), None),
+                answer(1, Answer::options(vec![0, 4]), None),
                 answer(2, Answer::Text("words".to_owned()), Some(9)),
             ]),
             passed_over: 2,
             at_ms,
-        },
-        Change::Saved {
+        }),
+        Change::Saved(Saved {
             number,
-            answers: Arc::new([answer(2, Answer::Text("wor".to_owned()), Some(8))]),
-        },
-        Change::Placed {
+            answers: Answers::from(vec![answer(2, Answer::Text("wor".to_owned()), Some(8))]),
+        }),
+        placed(None),
+        placed(Some(0)),
+        Change::GameEnded(GameEnded {
             number,
-            game: game(None),
-        },
-        Change::Placed {
-            number,
-            game: game(Some(0)),
-        },
-        Change::GameEnded {
-            number,
-            outcome: Outcome::Finished,
             at_ms,
-        },
-        Change::GameEnded {
+            finished: true,
+        }),
+        Change::GameEnded(GameEnded {
             number,
-            outcome: Outcome::Aborted,
             at_ms,
-        },
-        Change::Continued {
+            finished: false,
+        }),
+        Change::Continued(Continued {
             number,
             step_over: true,
             passed_over: 0,
             at_ms,
-        },
-        Change::Continued {
+        }),
+        Change::Continued(Continued {
             number,
             step_over: false,
             passed_over: 1,
             at_ms,
-        },
-        Change::DroppedOut { number, at_ms },
-        Change::ScreenedOut { number, at_ms },
-        Change::Withdrew {
+        }),
+        Change::DroppedOut(ended.clone()),
+        Change::ScreenedOut(ended.clone()),
+        Change::Withdrew(Withdrew {
             number,
             delete_data: true,
             at_ms,
-        },
-        Change::Withdrew {
+        }),
+        Change::Withdrew(Withdrew {
             number,
             delete_data: false,
             at_ms,
-        },
-        Change::Removed { number, at_ms },
-        Change::Closed,
+        }),
+        Change::Removed(ended),
+        Change::Closed(true),
     ]
 }
 
@@ -212,16 +212,61 @@ async fn stored_studies_are_read_back_and_forget_participants() {
 
         let rewritten = store.rewrite_study(study, vec![added(2)], vec![1]);
         rewritten.await.expect("committed");
-        let appended = store.append_study(study, 1, vec![Change::Closed]);
+        let appended = store.append_study(study, 1, vec![Change::Closed(true)]);
         appended.await.expect("committed");
         let stored = store.study(study).await.expect("readable").expect("stored");
         assert_eq!(
             (stored.changes, stored.rows),
-            (vec![added(2), Change::Closed], 2)
+            (vec![added(2), Change::Closed(true)], 2)
         );
         assert_eq!(store.traces(study).await, Ok(vec![traces(2)]));
         let stored = store.study(other).await.expect("readable").expect("stored");
         assert_eq!((stored.changes, stored.rows), (vec![added(1)], 1));
     })
     .await;
+}
+
+#[test]
+fn changes_that_are_not_whole_are_not_read() {
+    let joined = Added {
+        number: 1,
+        joined: Some(Joined {
+            request_sha256: vec![6; 31],
+            panel_id: String::new(),
+        }),
+        ..Added::default()
+    };
+    let consented = Consented {
+        text_sha256: vec![7; 33],
+        ..Consented::default()
+    };
+    let answers = Answers::from(vec![ItemAnswer::default()]);
+    let answered = Answered {
+        answers: answers.clone(),
+        ..Answered::default()
+    };
+    let saved = Saved { number: 1, answers };
+    let written = |change| changes_to_bytes(&[change]);
+    for (row, problem) in [
+        (
+            written(Change::Added(joined)),
+            "the hash of a request id has 31 bytes, not 32",
+        ),
+        (
+            written(Change::Consented(consented)),
+            "the hash of a consent has 33 bytes, not 32",
+        ),
+        (written(Change::Answered(answered)), "an answer is empty"),
+        (written(Change::Saved(saved)), "an answer is empty"),
+        (
+            written(Change::Placed(Placed::default())),
+            "the id of a room or game does not have 16 bytes",
+        ),
+        // Of a kind with the number 16.
+        (vec![3, 0x82, 1, 0], "a change is empty"),
+    ] {
+        let stored = StoredUnit::new(header(1).to_bytes(), vec![row]);
+        let error = StoredStudy::decode(header(1).id, &stored).expect_err(problem);
+        assert!(error.to_string().ends_with(problem), "{error}");
+    }
 }

@@ -101,7 +101,7 @@ fn on_another_device_nothing_begins_and_nothing_is_taken() {
     );
     lab.invite(&tests(2));
     let with = |pointer| Device {
-        pointer: Some(pointer),
+        pointer: pointer as u32,
         ..device()
     };
     let opened = |lab: &Lab, number, device| lab.study.open(number, device, lab.now_ms);
@@ -111,7 +111,7 @@ fn on_another_device_nothing_begins_and_nothing_is_taken() {
     }
     // The study gives slots when it is opened.
     let change = opened(&lab, 1, Some(with(Pointer::Coarse))).unwrap();
-    assert!(matches!(change, Some(Change::Opened { slot: Some(0), .. })));
+    assert!(matches!(&change, Some(Change::Opened(opened)) if opened.slot == Some(0)));
     lab.fold_all(change);
     // On another device it does not continue either, and the first session stays the newest.
     assert_eq!(opened(&lab, 1, Some(with(Pointer::Fine))), refused);

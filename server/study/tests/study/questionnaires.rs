@@ -107,12 +107,12 @@ fn answers_are_checked_item_by_item() {
     check(2, Answer::Number(1), "it is answered by options");
     check(
         2,
-        Answer::Options(vec![0, 1]),
+        Answer::options(vec![0, 1]),
         "2 options are not within 1..=1",
     );
     check(
         2,
-        Answer::Options(vec![3]),
+        Answer::options(vec![3]),
         "options must ascend within 0..=2",
     );
     check(3, text(""), "0 characters are not within 1..=12");
@@ -122,15 +122,15 @@ fn answers_are_checked_item_by_item() {
         "13 characters are not within 1..=12",
     );
     check(3, text("a\u{0}b"), "control characters are not allowed");
-    check(3, Answer::Options(vec![0]), "it is answered by a text");
+    check(3, Answer::options(vec![0]), "it is answered by a text");
     check(
         4,
-        Answer::Options(vec![1, 0]),
+        Answer::options(vec![1, 0]),
         "options must ascend within 0..=2",
     );
     check(
         4,
-        Answer::Options(vec![1, 1]),
+        Answer::options(vec![1, 1]),
         "options must ascend within 0..=2",
     );
     check(5, Answer::Number(1), "the questionnaire has no such item");
@@ -145,7 +145,7 @@ fn answers_are_checked_item_by_item() {
     let missing = answers(None).split_off(1);
     assert_eq!(refused(missing), "item 0: it must be answered");
 
-    for last in [Answer::Options(Vec::new()), Answer::Options(vec![0, 1, 2])] {
+    for last in [Answer::options(Vec::new()), Answer::options(vec![0, 1, 2])] {
         assert!(
             lab.study
                 .answer(lab.at(1), answers(Some((4, last))), 0)
@@ -262,8 +262,8 @@ fn earlier_answers_decide_what_is_shown() {
         lab.open(1).unwrap();
         let given = vec![
             answer(0, Answer::Number(age)),
-            answer(1, Answer::Options(plays.clone())),
-            answer(2, Answer::Options(vec![0])),
+            answer(1, Answer::options(plays.clone())),
+            answer(2, Answer::options(vec![0])),
         ];
         let mut given = Some(given);
         let mut reached = vec![0];
@@ -486,8 +486,8 @@ fn an_attention_check_is_passed_by_its_answers_and_no_others() {
         lab.open(1).unwrap();
         let given = vec![
             answer(0, Answer::Number(20 + passed)),
-            answer(1, Answer::Options(vec![2])),
-            answer(2, Answer::Options(chosen)),
+            answer(1, Answer::options(vec![2])),
+            answer(2, Answer::options(chosen)),
         ];
         lab.answer(1, given);
         // One of both checks is passed where none or all options are right.
@@ -520,7 +520,7 @@ fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
     };
     // Not all is answered, and what is entered changes.
     assert_eq!(save(&mut lab, &[number(0, 2)]), Ok(()));
-    let unticked = answer(4, Answer::Options(Vec::new()));
+    let unticked = answer(4, Answer::options(Vec::new()));
     let second = [number(0, 3), unticked];
     assert_eq!(save(&mut lab, &second), Ok(()));
     assert_eq!(saved(&lab), second);
@@ -556,7 +556,7 @@ fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
     let forgotten = lab.changes.iter_mut().filter_map(|change| {
         change.forget(1);
         match change {
-            Change::Saved { answers, .. } => Some(answers.is_empty()),
+            Change::Saved(saved) => Some(saved.answers.is_empty()),
             _ => None,
         }
     });

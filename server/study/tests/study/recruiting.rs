@@ -31,7 +31,7 @@ const NOW_MS: u64 = 1000;
 
 fn joining(request: u8, panel_id: &str) -> Joined {
     Joined {
-        request_sha256: [request; 32],
+        request_sha256: vec![request; 32],
         panel_id: panel_id.to_owned(),
     }
 }
@@ -89,8 +89,8 @@ fn nobody_joins_a_study_that_is_full_closed_or_has_no_open_link() {
 #[test]
 fn on_another_device_nobody_joins() {
     let required = RequiredDevice {
-        pointer: device().pointer,
-        min_width: device().width,
+        pointer: device().pointer(),
+        min_width: 390,
     };
     let mut study = Study::new(Settings {
         device: Some(required),
@@ -199,6 +199,10 @@ fn a_device_is_within_its_ranges() {
     });
     wrong.push(Device {
         pixels: 0,
+        ..device()
+    });
+    wrong.push(Device {
+        width: 65_536,
         ..device()
     });
     for device in wrong {

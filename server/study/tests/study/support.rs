@@ -25,7 +25,7 @@ pub(crate) fn device() -> Device {
         width: 390,
         height: 844,
         pixels: 300,
-        pointer: Some(Pointer::Coarse),
+        pointer: Pointer::Coarse as u32,
         time_zone: "Europe/Rome".to_owned(),
     }
 }
@@ -203,8 +203,8 @@ impl Lab {
 
 pub(crate) fn answer(item: usize, value: Answer) -> ItemAnswer {
     ItemAnswer {
-        item,
-        value,
+        item: item as u32,
+        value: Some(value),
         answered_after_ms: None,
     }
 }
@@ -217,7 +217,7 @@ pub(crate) fn valid(kind: &ItemKind) -> Answer {
         }
         ItemKind::Slider { min, step, .. } => Answer::Number(min + *step as i32),
         ItemKind::Number { min, .. } => Answer::Number(*min),
-        ItemKind::Choice { .. } => Answer::Options(vec![1]),
+        ItemKind::Choice { .. } => Answer::options(vec![1]),
         ItemKind::FreeText { .. } => Answer::Text("It was\nfun.".to_owned()),
     }
 }

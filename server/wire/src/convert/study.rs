@@ -281,10 +281,10 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
 /// A participant's device; `None` if it is not of the form of the protocol.
 pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
     let device = Device {
-        width: message.width.try_into().ok()?,
-        height: message.height.try_into().ok()?,
-        pixels: message.pixels.try_into().ok()?,
-        pointer: Pointer::of(message.pointer()),
+        width: message.width,
+        height: message.height,
+        pixels: message.pixels,
+        pointer: Pointer::of(message.pointer()).map_or(0, |it| it as u32),
         time_zone: message.time_zone,
     };
     device.is_valid().then_some(device)
@@ -292,11 +292,12 @@ pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
 
 /// A participant's device as a message.
 pub fn device_to_proto(device: &Device) -> v1::StudyDevice {
-    let pointer = (device.pointer).map_or(v1::StudyPointer::Unspecified, Pointer::to_proto);
+    let pointer = device.pointer();
+    let pointer = pointer.map_or(v1::StudyPointer::Unspecified, Pointer::to_proto);
     v1::StudyDevice {
-        width: device.width.into(),
-        height: device.height.into(),
-        pixels: device.pixels.into(),
+        width: device.width,
+        height: device.height,
+        pixels: device.pixels,
         pointer: pointer.into(),
         time_zone: device.time_zone.clone(),
     }
@@ -743,7 +744,7 @@ pub fn study_participant(
             .consent
             .as_ref()
             .map(|consent| v1::StudyConsentGiven {
-                text_sha256: consent.text_sha256.to_vec(),
+                text_sha256: consent.text_sha256.clone(),
                 version: consent.version.clone(),
                 language: consent.language.clone(),
                 at_ms: consent.at_ms,

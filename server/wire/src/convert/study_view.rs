@@ -118,11 +118,11 @@ fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(RoomId) -> String) -> v1:
 pub fn answers_to_proto(answers: &[ItemAnswer]) -> Vec<v1::StudyItemAnswer> {
     use study_item_answer::Value;
     let answer = |answer: &ItemAnswer| v1::StudyItemAnswer {
-        item: number(answer.item),
-        value: Some(match &answer.value {
+        item: answer.item,
+        value: answer.value.as_ref().map(|value| match value {
             Answer::Number(number) => Value::Number(*number),
             Answer::Options(chosen) => Value::Options(v1::StudyChosen {
-                options: chosen.iter().copied().map(number).collect(),
+                options: chosen.options.clone(),
             }),
             Answer::Text(text) => Value::Text(text.clone()),
         }),
@@ -137,19 +137,16 @@ pub fn answers_to_proto(answers: &[ItemAnswer]) -> Vec<v1::StudyItemAnswer> {
 /// An answer has no value.
 pub fn answers_from_proto(answers: Vec<v1::StudyItemAnswer>) -> Result<Vec<ItemAnswer>, u32> {
     use study_item_answer::Value;
-    let wide = |number: u32| usize::try_from(number).unwrap_or(usize::MAX);
     let answer = |message: v1::StudyItemAnswer| {
         let value = match message.value {
             None => return Err(message.item),
             Some(Value::Number(number)) => Answer::Number(number),
-            Some(Value::Options(chosen)) => {
-                Answer::Options(chosen.options.into_iter().map(wide).collect())
-            }
+            Some(Value::Options(chosen)) => Answer::options(chosen.options),
             Some(Value::Text(text)) => Answer::Text(text),
         };
         Ok(ItemAnswer {
-            item: wide(message.item),
-            value,
+            item: message.item,
+            value: Some(value),
             answered_after_ms: message.answered_after_ms,
         })
     };

@@ -174,7 +174,7 @@ impl ParticipationService for StudyCalls {
         })?;
         let panel_id = request.panel_id;
         let joined = Joined {
-            request_sha256: Sha256::digest(request_id).into(),
+            request_sha256: Sha256::digest(request_id).to_vec(),
             panel_id: panel_id.clone(),
         };
         self.calls.charge(key, COST_OF_ROOM);

@@ -299,7 +299,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
                 row.participant
                     .consent
                     .as_ref()
-                    .map(|it| hex::encode(it.text_sha256)),
+                    .map(|it| hex::encode(&it.text_sha256)),
             )
         },
     )
@@ -634,7 +634,7 @@ pub(super) fn sessions<'s>() -> Table<SessionRow<'s>> {
             text(row.opened.device.pixels)
         })
         .with("pointer", Kind::one_of(pointers), POINTER, |row| {
-            let known = (POINTERS.iter()).find(|(it, ..)| Some(*it) == row.opened.device.pointer);
+            let known = (POINTERS.iter()).find(|(it, ..)| Some(*it) == row.opened.device.pointer());
             known.map_or_else(String::new, |(_, code, _)| (*code).to_owned())
         })
         .empty("it is not known")

@@ -402,7 +402,7 @@ impl Export<'_> {
                         questionnaire,
                         item,
                         position: position.map(|position| position + 1),
-                        answer: answers.iter().find(|answer| answer.item == index),
+                        answer: answers.iter().find(|answer| answer.index() == index),
                     };
                     file.row(&row).await?;
                 }

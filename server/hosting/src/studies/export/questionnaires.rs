@@ -211,15 +211,16 @@ impl AnswerRow<'_> {
         reached.filter(|_| was_shown)
     }
 
+    fn value(&self) -> Option<&Answer> {
+        self.answer?.value.as_ref()
+    }
+
     /// The numbers that answer the item.
     fn chosen(&self) -> Vec<i64> {
-        match self.answer.map(|it| &it.value) {
+        match self.value() {
             Some(Answer::Number(number)) => vec![i64::from(*number)],
-            Some(Answer::Options(options)) => {
-                let options = options
-                    .iter()
-                    .map(|it| i64::try_from(*it).unwrap_or(i64::MAX));
-                options.collect()
+            Some(Answer::Options(chosen)) => {
+                chosen.options.iter().copied().map(i64::from).collect()
             }
             Some(Answer::Text(_)) | None => Vec::new(),
         }
@@ -292,11 +293,9 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
             status.to_owned()
         },
     )
-    .with("answer", Kind::Text, ANSWER, |row| {
-        match row.answer.map(|it| &it.value) {
-            Some(Answer::Text(words)) => words.clone(),
-            _ => row.chosen().iter().map(text).collect::<Vec<_>>().join(" "),
-        }
+    .with("answer", Kind::Text, ANSWER, |row| match row.value() {
+        Some(Answer::Text(words)) => words.clone(),
+        _ => row.chosen().iter().map(text).collect::<Vec<_>>().join(" "),
     })
     .empty(NO_ANSWER)
     .with("label", Kind::Text, LABEL, |row| {
@@ -312,8 +311,8 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     .empty(NO_LABEL)
     .with("passed", Kind::Boolean, PASSED, |row| {
         let passing = row.item.attention_check.as_ref();
-        let passing = passing.zip(row.answer);
-        optional(passing.map(|(passing, answer)| passing.is_passed_by(&answer.value)))
+        let passing = passing.zip(row.value());
+        optional(passing.map(|(passing, answer)| passing.is_passed_by(answer)))
     })
     .empty("the item is not an attention check, or was not answered")
     .with("answered_after_ms", MILLISECONDS, AFTER, |row| {
