@@ -1,4 +1,7 @@
 //! Headers and journals of tournaments.
+//!
+//! Entries have forms of their own: those of the server stand between changes of the core, whose
+//! numbers are indices, and whose agents, kinds and statistics are types of other crates.
 
 use chefshat_proto::v1;
 use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistics};
