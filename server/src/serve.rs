@@ -340,7 +340,13 @@ impl Server {
         I: Stream<Item = io::Result<C>> + Send,
         C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
     {
-        let ending = Ending::of(&self);
+        let ending = Ending::new(
+            &self.store,
+            &self.rooms,
+            &self.tournaments,
+            &self.studies,
+            self.config.grace,
+        );
         let mut node = self.node.take();
         let is_node = node.is_some();
         let (health, health_service) = tonic_health::server::health_reporter();

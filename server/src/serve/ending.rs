@@ -13,7 +13,6 @@ use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 use tracing::{info, warn};
 
-use super::Server;
 use crate::config::{CLOSE_LIMIT, DRAIN_LIMIT, END_LIMIT, HAND_OVER_LIMIT, longest_shutdown};
 use crate::node::ClusterNode;
 use crate::rooms::Rooms;
@@ -36,14 +35,21 @@ pub(super) struct Ending {
 }
 
 impl Ending {
-    pub(super) fn of(server: &Server) -> Self {
+    /// An end that gives running games this time.
+    pub(super) fn new(
+        store: &Arc<dyn Store>,
+        rooms: &Arc<Rooms>,
+        tournaments: &Arc<Tournaments>,
+        studies: &Arc<Studies>,
+        grace: Duration,
+    ) -> Self {
         Self {
             closing: CancellationToken::new(),
-            store: Arc::clone(&server.store),
-            rooms: Arc::clone(&server.rooms),
-            tournaments: Arc::clone(&server.tournaments),
-            studies: Arc::clone(&server.studies),
-            grace: server.config.grace,
+            store: Arc::clone(store),
+            rooms: Arc::clone(rooms),
+            tournaments: Arc::clone(tournaments),
+            studies: Arc::clone(studies),
+            grace,
             began: OnceLock::new(),
         }
     }
