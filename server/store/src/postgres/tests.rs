@@ -188,7 +188,7 @@ async fn finish(journal: &mut Box<dyn Journal>, room: u8) {
 
 /// Creates and ends a game of a room, whose record has been written to a file.
 async fn played(store: &PostgresStore, room: u8) {
-    let mut journal = created(&store, room).await;
+    let mut journal = created(store, room).await;
     finish(&mut journal, room).await;
     let written = store.mark_record_written(id(room)).await;
     written.expect("committed");

@@ -545,7 +545,7 @@ async fn a_cursor_misses_no_game_that_nodes_finish_at_the_same_time() {
     let mut finishing = Vec::new();
     for room in 1..=40 {
         let store = [&first, &second][usize::from(room % 2)];
-        let mut journal = created(&store, room).await;
+        let mut journal = created(store, room).await;
         finishing.push(tokio::spawn(async move {
             journal.finish(Some(summary(room)), None).await
         }));
