@@ -23,7 +23,7 @@ use v1::tournament_service_client::TournamentServiceClient;
 
 use super::*;
 use crate::access::{AccessSettings, Mode};
-use crate::config::KeepGames;
+use crate::config::{KeepGames, longest_shutdown};
 use crate::store::SqliteStore;
 use crate::store::testing::{Database, FakeStore};
 use crate::tasks::{LongTask, polls, short_polls};
