@@ -99,20 +99,17 @@ async fn played(
         }
     };
     if let Err(error) = played {
-        // Games fail when an agent has exited: then that is what to say.
-        return match timeout(END, first_exit(&mut processes)).await {
-            Ok((index, error)) if !processes.is_empty() => {
-                Err(explained(error, processes.swap_remove(index)).await)
-            }
-            _ => Err(error),
-        };
+        // Games fail when an agent that reads them has exited: then that is what to say.
+        if !processes.is_empty()
+            && let Ok((index, error)) = timeout(END, first_exit(&mut processes)).await
+        {
+            return Err(explained(error, processes.swap_remove(index)).await);
+        }
+        return Err(error);
     }
-    // They read no more games, and exit. Those that do not are killed.
+    // They read no more games, and exit.
     drop(rooms);
-    let exits = stream::iter(&mut processes).for_each_concurrent(None, async |process| {
-        let _exited = process.ended().await;
-    });
-    let _exited = timeout(EXIT, exits).await;
+    let_exit(&mut processes).await;
     played
 }
 
@@ -124,6 +121,15 @@ fn most_seats(duplicate: &Duplicate, whose: usize) -> usize {
         _ => players - seating.a_seats(),
     });
     seats.max().unwrap_or(0)
+}
+
+/// Waits until processes have exited after their last game. Those that take too long are killed when they
+/// are dropped.
+async fn let_exit(processes: &mut [AgentProcess]) {
+    let exits = stream::iter(processes).for_each_concurrent(None, async |process| {
+        let _exited = process.ended().await;
+    });
+    let _exited = timeout(EXIT, exits).await;
 }
 
 /// Waits until one of these processes has exited, for ever if there is none. Returns its index and
@@ -196,10 +202,7 @@ impl Rooms<'_> {
             self.play_here(agents),
         )?;
         open.leave_open();
-        let exits = stream::iter(&mut processes).for_each_concurrent(None, async |process| {
-            let _exited = process.ended().await;
-        });
-        let _exited = timeout(EXIT, exits).await;
+        let_exit(&mut processes).await;
         let lines = record(&self.host.client, &room.game_id).await?;
         self.tally(seating, &lines)
     }
