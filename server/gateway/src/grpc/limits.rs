@@ -61,8 +61,8 @@ fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
     Client::of(extensions).filter(|client| !client.is_proxy())
 }
 
-/// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
-/// ignores so many refusals is disconnected, but not behind a proxy (`None`).
+/// Refuses a call for which no place to wait is left. Refusing costs work as well, so the connection of
+/// the client is closed; `None`: it is a proxy's, and stays open for the others behind it.
 fn too_many_waiting(client: Option<&Arc<Client>>) -> Status {
     let message = match client {
         Some(client) => {

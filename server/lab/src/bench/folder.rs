@@ -132,7 +132,7 @@ impl Folder {
             }
         }
         if folder.lock.is_some() {
-            // What a run that was killed has left: whoever gets the folder would get it, too.
+            // Files that a killed run left half written would be published with the folder.
             jsonl::remove_unfinished(path).map_err(named)?;
         }
         write_json(&file, &folder.manifest)?;
